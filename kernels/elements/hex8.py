@@ -32,18 +32,18 @@ wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
+def force_kernel(precision: str, law_name: str, finite: bool = False, viscous: bool = False) -> Any:
     """Kernel: forces of each element on its nodes, and the plastic history where there is a law.
 
     Every plastic element takes the return map, which suits a CPU that computes several elements side by side; a GPU
     runs `kernels.elements.hex8_patch`.
     """
     if finite or law_functions(law_name, precision).general:
-        return points_force_kernel(precision, law_name, finite)
+        return points_force_kernel(precision, law_name, finite, viscous)
     t = scalars(precision)
     R, vec3 = t.real, t.vec3
     load_in_frame = framed_function(precision)
-    element_forces = small_strain_function(precision, law_name)
+    element_forces = small_strain_function(precision, law_name, viscous)
     store_force = store_function(precision)
     keep_strain, keep_volume, strain_square = keep_functions(R)
     scale = LINE_SCALE**3
@@ -68,7 +68,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
         m = material[e]
         K = R(scale) * law[m, 0]
         G = R(scale) * law[m, 1]
-        f, largest = element_forces(Xl, ul, W, K, G, e, m, law, yielded_out, history_out)
+        f, largest = element_forces(Xl, ul, W, K, G, e, m, law, dt, yielded_out, history_out, extreme_out)
         keep_strain(e, strain_square(largest, G), extreme_out)
         keep_volume(e, R(1.0) - J, extreme_out)
         for a in range(8):

@@ -50,7 +50,9 @@ def element(precision: str, law_name: str) -> PatchElement:
         """Whether the element begins to yield; if so, its forces are not valid."""
         G = R(scale) * law[m, 1]
         local = local_displacement(Xl, ul, W)
-        f, largest = element_forces(Xl, local, W, R(scale) * law[m, 0], G, e, m, law, yielded_out, history_out)
+        K = R(scale) * law[m, 0]
+        none = R(0.0)  # time step
+        f, largest = element_forces(Xl, local, W, K, G, e, m, law, none, yielded_out, history_out, extreme_out)
         keep_forces(force_out, lane, f)
         keep_strain(e, strain_square(largest, G), extreme_out)
         yields = bool(False)

@@ -15,6 +15,7 @@ from warp_mca.kernels.elements.hexahedron import (
     node_force_function,
     store_function,
 )
+from warp_mca.kernels.elements.viscosity import viscosity_function
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.materials.kinematics import kinematics
 from warp_mca.kernels.materials.point import material_point
@@ -59,7 +60,7 @@ def shared_functions(precision: str, finite: bool) -> tuple[Any, Any]:
 
 
 @cache
-def points_force_kernel(precision: str, law_name: str, finite: bool) -> Any:
+def points_force_kernel(precision: str, law_name: str, finite: bool, viscous: bool) -> Any:
     """The force kernel: volumes first, because the pressure's direction varies within an element at finite strain.
 
     All points share the mean dilatation. The pressure of a law of flow follows from it; that of a general law is the
@@ -79,6 +80,7 @@ def points_force_kernel(precision: str, law_name: str, finite: bool) -> Any:
     k = kinematics(precision, finite)
     deviator, nominal, pressure_of = k.deviator, k.nominal, k.pressure
     mean_dilatation, pressure_lines = shared_functions(precision, finite)
+    viscous_pressure = viscosity_function(precision, finite, viscous)
 
     @wp.kernel(enable_backward=False, module="unique")
     def hex8_points_force(
@@ -105,6 +107,7 @@ def points_force_kernel(precision: str, law_name: str, finite: bool) -> Any:
         mean = R(0.0)
         if wp.static(general):
             pressure = R(0.0)
+        pressure = pressure + viscous_pressure(e, theta, volume, dt, extreme_out)
         flag = int(0)
         if wp.static(plastic):
             flag = yielded_out[e]

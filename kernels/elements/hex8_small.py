@@ -14,6 +14,7 @@ from warp_mca.kernels.elements.hexahedron import (
     lines_of_point,
     node_force_function,
 )
+from warp_mca.kernels.elements.viscosity import viscosity_function
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.materials.point import flow_function
 
@@ -69,12 +70,12 @@ def stress_functions(precision: str) -> tuple[Any, Any, Any, Any]:
 
 
 @cache
-def small_strain_function(precision: str, law_name: str) -> Any:
+def small_strain_function(precision: str, law_name: str, viscous: bool = False) -> Any:
     """The function that gives the corner forces of an element, and the greatest S : S / 2 of a point.
 
     It takes corners, local displacements and frame W; the material m and its K and G; where there is a law, the history
-    of element e. Jacobians lack the factor LINE_SCALE^3. Strains do not depend on it, and K, G and stresses are those
-    of the material times this factor, so that forces are right.
+    of element e; of a viscous one the time step and extremes. Jacobians lack the factor LINE_SCALE^3. Strains do
+    not depend on it, and K, G and stresses are those of the material times this factor, so that forces are right.
     """
     t = scalars(precision)
     R, mat33, mat43, mat83 = t.real, t.mat33, t.mat43, t.mat83
@@ -82,7 +83,8 @@ def small_strain_function(precision: str, law_name: str) -> Any:
     _, to_lines = line_functions(precision)
     edge_to_node = node_force_function(precision)
     add_traction, symmetric_gradient, deviator, invariant = stress_functions(precision)
-    plastic, flow_at = bool(law_name), flow_function(precision, law_name, points=8, scale=LINE_SCALE**3)
+    viscous_pressure, scale = viscosity_function(precision, False, viscous), LINE_SCALE**3
+    plastic, flow_at = bool(law_name), flow_function(precision, law_name, points=8, scale=scale)
 
     @wp.func
     def element_forces(
@@ -94,8 +96,10 @@ def small_strain_function(precision: str, law_name: str) -> Any:
         e: int,
         m: int,
         law: wp.array2d(dtype=R),
+        dt: R,
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
+        extreme_out: wp.array2d(dtype=R),
     ):
         gx, gy, gz = gauss_lines(Xl)
         lx, ly, lz = gauss_lines(ul)
@@ -123,8 +127,7 @@ def small_strain_function(precision: str, law_name: str) -> Any:
             dilatation += trace
             shear = G / det
             direct = shear + shear
-            mean = R(THIRD) * trace
-            S = deviator(direct, shear, mean, xx, yy, zz, xy, yz, xz)
+            S = deviator(direct, shear, R(THIRD) * trace, xx, yy, zz, xy, yz, xz)
             largest = wp.max(largest, invariant(S))
             if wp.static(plastic):
                 S, dp = flow_at(S, G, history_place(g), e, m, flag, law, history_out)
@@ -139,7 +142,8 @@ def small_strain_function(precision: str, law_name: str) -> Any:
         if wp.static(plastic):
             if flag_new != flag:
                 yielded_out[e] = flag_new
-        pressure = K * dilatation / volume
+        q = R(scale) * viscous_pressure(e, dilatation / volume, R(scale) * volume, dt, extreme_out)
+        pressure = K * dilatation / volume + q
         Fx = to_lines(Sx + pressure * Bx)
         Fy = to_lines(Sy + pressure * By)
         Fz = to_lines(Sz + pressure * Bz)

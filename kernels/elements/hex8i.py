@@ -16,7 +16,9 @@ from warp_mca.kernels.elements.hexahedron import load_function, store_function
 from warp_mca.kernels.elements.internal_modes import mode_functions, place_functions
 from warp_mca.kernels.elements.patterns import corner_force_function, pattern_functions, pattern_strain_function
 from warp_mca.kernels.elements.readings import energy_kernel, stress_kernel
+from warp_mca.kernels.elements.viscosity import viscosity_function
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.materials.kinematics import kinematics
 from warp_mca.kernels.materials.laws import Law, law_functions
 from warp_mca.kernels.records.extremes import LAG_LOSS, keep_functions
 
@@ -34,10 +36,10 @@ def lags(law: Law, finite: bool) -> bool:
 
 
 @cache
-def force_kernel(points: int, precision: str, law_name: str, finite: bool = False) -> Any:
+def force_kernel(points: int, precision: str, law_name: str, finite: bool = False, viscous: bool = False) -> Any:
     """Kernel: forces of each element on its nodes [N], and the history."""
     t = scalars(precision)
-    R, vec3 = t.real, t.vec3
+    R, vec3, mat33 = t.real, t.vec3, t.mat33
     load_element, store_force = load_function(precision), store_function(precision)
     to_patterns, _ = pattern_functions(precision)
     shape_and_strain, corner_forces = pattern_strain_function(precision, finite), corner_force_function(precision)
@@ -47,6 +49,8 @@ def force_kernel(points: int, precision: str, law_name: str, finite: bool = Fals
     points_stress = hex8i_points.stress_function(precision, law_name, finite, points)
     elastic_stress = elastic_function(precision, points)
     flow_stress = stress_function(precision, law_name, points) if plastic else None
+    k, viscous_pressure = kinematics(precision, finite), viscosity_function(precision, finite)
+    dilatation_of, nominal = k.dilatation, k.nominal
 
     # fast math would lose the digits of ln(1 + x) of small x
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
@@ -88,6 +92,9 @@ def force_kernel(points: int, precision: str, law_name: str, finite: bool = Fals
                 P, Q, largest = elastic_stress(x, volume, H, q, y, law[m, 0], law[m, 1])
             keep_strain(e, strain_square(largest, law[m, 1]), extreme_out)
         keep_volume(e, R(1.0) - J, extreme_out)
+        if wp.static(viscous):
+            pressure = viscous_pressure(e, dilatation_of(H), volume, dt, extreme_out)
+            P = P + nominal(H, mat33(), mat33(), vec3(), pressure)
         f = corner_forces(x, b, volume, W, P, Q)
         for a in range(8):
             store_force(force_out, slot + a * count + e, f, a)

@@ -25,6 +25,7 @@ from warp_mca.kernels.elements.patterns import (
 )
 from warp_mca.kernels.elements.readings import energy_kernel as energy_of
 from warp_mca.kernels.elements.readings import stress_kernel as stress_of
+from warp_mca.kernels.elements.viscosity import viscosity_function
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.materials.kinematics import kinematics
 from warp_mca.kernels.materials.laws import Law, law_functions
@@ -42,7 +43,7 @@ def kept(law: Law, finite: bool) -> tuple[str, ...]:
 
 
 @cache
-def stress_function(precision: str, law_name: str, finite: bool) -> Any:
+def stress_function(precision: str, law_name: str, finite: bool, viscous: bool = False) -> Any:
     """The function that gives stress and hourglass forces of an element, with plastic flow; it keeps the strain.
 
     A larger function, or a matrix that changes within a branch, would prevent vectorisation on a CPU.
@@ -55,6 +56,7 @@ def stress_function(precision: str, law_name: str, finite: bool) -> Any:
     read_amplitudes, write_amplitudes = amplitude_functions(precision, point.size)
     lost = point.size + AMPLITUDE_ROWS
     keep_strain, _, _ = keep_functions(R)
+    viscous_pressure = viscosity_function(precision, finite, viscous)
     k = kinematics(precision, finite)
     dilatation_of, deviator, nominal, pressure_of = k.dilatation, k.deviator, k.nominal, k.pressure
 
@@ -96,6 +98,7 @@ def stress_function(precision: str, law_name: str, finite: bool) -> Any:
                     yielded_out[e] = int(1)
         if wp.static(not general):
             pressure = pressure_of(K, theta)
+        pressure = pressure + viscous_pressure(e, theta, volume, dt, extreme_out)
         P = nominal(H, S, N, d, pressure)
         Q, stored = hourglass(q, x, volume, K, G)
         if wp.static(plastic):
@@ -110,14 +113,14 @@ def stress_function(precision: str, law_name: str, finite: bool) -> Any:
 
 
 @cache
-def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
+def force_kernel(precision: str, law_name: str, finite: bool = False, viscous: bool = False) -> Any:
     """Kernel: forces of each element on its nodes, and the plastic history where there is a law."""
     t = scalars(precision)
     R, vec3 = t.real, t.vec3
     load_element = load_function(precision)
     to_patterns, _ = pattern_functions(precision)
     shape_and_strain, corner_forces = pattern_strain_function(precision, finite), corner_force_function(precision)
-    stress_and_flow = stress_function(precision, law_name, finite)
+    stress_and_flow = stress_function(precision, law_name, finite, viscous)
     store_force = store_function(precision)
     _, keep_volume, _ = keep_functions(R)
 

@@ -16,6 +16,7 @@ from warp_mca.kernels.elements.formulation import MEAN, OWN, Formulation, Maker,
 from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.kernels.elements.readings import energy_kernel, stress_kernel
 from warp_mca.kernels.elements.tet10_points import BESIDE, FAR, POINT, between, centre_function, tet10_functions
+from warp_mca.kernels.elements.viscosity import viscosity_function
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.materials.kinematics import kinematics
 from warp_mca.kernels.records.extremes import keep_functions
@@ -145,31 +146,38 @@ def spread_functions(precision: str) -> tuple[Any, Any, Any]:
 
 
 @cache
-def pressure_function(precision: str, law_name: str, finite: bool, mean: bool) -> Any:
-    """The function (struct, K) -> mean dilatation [-], its pressure [Pa] and volume [m^3]; 0 without need of one."""
+def pressure_function(precision: str, finite: bool, mean: bool, viscous: bool) -> Any:
+    """The function (struct, K, e, dt, extreme_out) -> mean dilatation [-], its pressure [Pa], volume [m^3], q [Pa].
+
+    The first three are 0 without need of them.
+    """
     TenNodes, _load_tet10, point_gradient = tet10_functions(precision, finite)
     R, k = scalars(precision).real, kinematics(precision, finite)
-    dilatation_of, pressure_of = k.dilatation, k.pressure
+    dilatation_of, pressure_of, viscous_pressure = (
+        k.dilatation,
+        k.pressure,
+        viscosity_function(precision, finite, viscous),
+    )
 
     @wp.func
-    def mean_pressure(it: TenNodes, K: R):
+    def mean_pressure(it: TenNodes, K: R, e: int, dt: R, extreme_out: wp.array2d(dtype=R)):
         theta = R(0.0)
         volume = R(0.0)
         pressure = R(0.0)
-        if wp.static(mean):
+        if wp.static(mean or viscous):
             for g in range(4):
                 H, _cofactors, weight = point_gradient(it, g)
                 theta += dilatation_of(H) * weight
                 volume += weight
             theta = theta / volume
             pressure = pressure_of(K, theta)
-        return theta, pressure, volume
+        return theta, pressure, volume, viscous_pressure(e, theta, volume, dt, extreme_out)
 
     return mean_pressure
 
 
 @cache
-def tet10_force_kernel(maker: Maker, precision: str, law_name: str, finite: bool = False) -> Any:
+def tet10_force_kernel(maker: Maker, precision: str, law_name: str, finite: bool = False, viscous: bool = False) -> Any:
     """Kernel: forces of each element on its nodes, and the plastic history where there is a law.
 
     A general law gives the pressure of each point; its mean, which is conjugate to the mean dilatation, is known behind
@@ -185,7 +193,7 @@ def tet10_force_kernel(maker: Maker, precision: str, law_name: str, finite: bool
     plastic, mean, update = bool(law_name), form.pressure == MEAN, point.update
     own, later = not mean, point.general and mean  # pressures of points, known by themselves or behind them
     by_law = point.general
-    mean_pressure = pressure_function(precision, law_name, finite, mean)
+    mean_pressure = pressure_function(precision, finite, mean, viscous)
     keep_strain, keep_volume, _ = keep_functions(R)
     k = kinematics(precision, finite)
     dilatation_of, deviator, pressure_of, nominal = k.dilatation, k.deviator, k.pressure, k.nominal
@@ -221,7 +229,7 @@ def tet10_force_kernel(maker: Maker, precision: str, law_name: str, finite: bool
         if wp.static(plastic):
             flag = yielded_out[e]
         flows = int(flag)
-        theta, pressure, volume = mean_pressure(it, law[m, 0])
+        theta, pressure, volume, q = mean_pressure(it, law[m, 0], e, dt, extreme_out)
         largest = R(0.0)
         smallest = R(1.0)
         behind = R(0.0)
@@ -244,7 +252,7 @@ def tet10_force_kernel(maker: Maker, precision: str, law_name: str, finite: bool
             if wp.static(later):
                 behind += pressure * weight / volume
                 pressure = R(0.0)
-            f, sums, spin = add_point(f, sums, spin, nominal(H, S, N, d, pressure), H, weight, cofactors, it.W, g)
+            f, sums, spin = add_point(f, sums, spin, nominal(H, S, N, d, pressure + q), H, weight, cofactors, it.W, g)
         if wp.static(later):
             for g in range(4):
                 H, cofactors, weight = point_gradient(it, g)

@@ -15,6 +15,7 @@ from warp_mca.kernels.elements.fused import fused
 from warp_mca.kernels.elements.patterns import mean_frame
 from warp_mca.kernels.elements.readings import energy_kernel as energy_of
 from warp_mca.kernels.elements.readings import stress_kernel as stress_of
+from warp_mca.kernels.elements.viscosity import viscosity_function
 from warp_mca.kernels.hardware.early_launch import begins_early, wait_for_previous
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.materials.kinematics import kinematics
@@ -107,7 +108,7 @@ def average_kernel(precision: str) -> Any:
 
 
 @cache
-def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
+def force_kernel(precision: str, law_name: str, finite: bool = False, viscous: bool = False) -> Any:
     """Kernel: forces of each element on its nodes, and the plastic history where there is a law."""
     t = scalars(precision)
     R, vec3 = t.real, t.vec3
@@ -116,7 +117,8 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     add_matrices = fused(precision).add_matrices
     keep_strain, keep_volume, _ = keep_functions(R)
     k = kinematics(precision, finite)
-    deviator, nominal, pressure_of = k.deviator, k.nominal, k.pressure
+    dilatation_of, deviator, nominal, pressure_of = k.dilatation, k.deviator, k.nominal, k.pressure
+    viscous_pressure = viscosity_function(precision, finite, viscous)
 
     # fast math would lose the digits of ln(1 + x) of small x
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
@@ -138,11 +140,12 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     ):
         wait_for_previous()
         e = wp.tid()
-        W, H, c, _volume, J = tet_gradient(X, conn, u, e)
+        W, H, c, volume, J = tet_gradient(X, conn, u, e)
         m = material[e]
         pressure = R(0.0)
         for a in range(4):
             pressure += R(0.25) * pressure_of(law[m, 0], dilatation[group[a, e]])
+        pressure += viscous_pressure(e, dilatation_of(H), volume, dt, extreme_out)
         strain, N, d = deviator(H)
         keep_strain(e, wp.ddot(strain, strain), extreme_out)
         keep_volume(e, R(1.0) - J, extreme_out)

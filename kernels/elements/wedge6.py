@@ -11,7 +11,8 @@ import warp as wp
 from warp_mca.kernels.elements.formulation import OWN, Formulation
 from warp_mca.kernels.elements.readings import energy_kernel as energy_of
 from warp_mca.kernels.elements.readings import stress_kernel as stress_of
-from warp_mca.kernels.elements.wedge_shape import CORNERS, POINTS, SIXTH, place_function
+from warp_mca.kernels.elements.viscosity import viscosity_function
+from warp_mca.kernels.elements.wedge_shape import CORNERS, POINTS, SIXTH, pattern_functions, place_function
 from warp_mca.kernels.elements.wedge_strain import force_function, shape_functions
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.materials.kinematics import kinematics
@@ -60,6 +61,30 @@ def formulation(precision: str, law_name: str, finite: bool) -> Formulation:
 
 
 @cache
+def viscous_function(precision: str, law_name: str, finite: bool, viscous: bool) -> Any:
+    """The function (f, shape, e, dt, extreme_out) -> forces on the corners [N] with those of bulk viscosity, if any."""
+    t, k = scalars(precision), kinematics(precision, finite)
+    R, vec3, mat33, mat53, mat63 = t.real, t.vec3, t.mat33, wp.types.matrix((5, 3), t.real), t.mat63
+    Wedge6, _, _, _ = shape_functions(precision, law_name, finite)
+    _, to_corners = pattern_functions(precision)
+    dilatation_of, nominal, viscous_pressure = k.dilatation, k.nominal, viscosity_function(precision, finite)
+
+    @wp.func
+    def with_viscosity(f: mat63, shape: Wedge6, e: int, dt: R, extreme_out: wp.array2d(dtype=R)):
+        if wp.static(viscous):
+            q = viscous_pressure(e, dilatation_of(shape.H), shape.volume, dt, extreme_out)
+            P = nominal(shape.H, mat33(), mat33(), vec3(), q)
+            P = P + shape.W * P
+            more = mat53()
+            for p in range(5):
+                more[p] = -P * shape.b[p]
+            f = f + to_corners(more)
+        return f
+
+    return with_viscosity
+
+
+@cache
 def vector_function(precision: str, law_name: str, finite: bool) -> Any:
     """The function that changes the kept part of the internal vector by -`loose` / 2, see `force_function`.
 
@@ -89,7 +114,7 @@ def vector_function(precision: str, law_name: str, finite: bool) -> Any:
 
 
 @cache
-def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
+def force_kernel(precision: str, law_name: str, finite: bool = False, viscous: bool = False) -> Any:
     """Kernel: forces of each element on its nodes, plastic history, and the inelastic part of the internal vector."""
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
@@ -100,6 +125,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
     plastic, general, update = bool(law_name), point.general, point.update
     dilatation_of, deviator, pressure_of, nominal = k.dilatation, k.deviator, k.pressure, k.nominal
     keep_strain, keep_volume, _ = keep_functions(R)
+    with_viscosity = viscous_function(precision, law_name, finite, viscous)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
     def wedge6_force(
@@ -151,6 +177,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False) -> Any:
             if wp.static(finite):
                 A = A + strain_at(shape, g) * P
         f, left, loose = forces(shape, law[m, 0], law[m, 1], A, M, Mz, Mr, Ms)
+        f = with_viscosity(f, shape, e, dt, extreme_out)
         if wp.static(plastic):
             if wp.static(general) or flows != 0:
                 keep_vector(shape, left, loose, e, history_out, extreme_out)

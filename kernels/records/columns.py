@@ -1,9 +1,9 @@
 """Owns the columns of a record: those of the whole scene, then PASS_COLUMNS for each of its contact passes."""
 
 # Energies [J], greatest deviatoric strain and least ratio of volumes [-], works done [J]; of a chain's joints and base,
-# work put in, heat of friction, and kinetic energy of the carriage [J]:
+# work put in, heat of friction, and kinetic energy of the carriage [J]; what bulk viscosity took [J]:
 KINETIC, GRAVITY_WORK, ELASTIC, PLASTIC, STRAIN, JACOBIAN, HOURGLASS, DRIVE_WORK = range(8)
-LOAD_WORK, JOINT_HEAT, CARRIAGE, PASS = range(8, 12)
+LOAD_WORK, JOINT_HEAT, CARRIAGE, VISCOUS, PASS = range(8, 13)
 
 # Of a pass, as `kernels.contact.spring_sums.sum_springs` sums them. Since the last row of the history: the whole
 # force, the normal forces and those of sticking nodes, each summed over the steps [N]. At the record: vector sum of

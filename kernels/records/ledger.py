@@ -20,6 +20,7 @@ from warp_mca.kernels.records.columns import (
     KINETIC,
     PLASTIC,
     STRAIN,
+    VISCOUS,
 )
 
 SUM_WIDTH = 256  # runs of a scene at most
@@ -87,8 +88,8 @@ def record_motion(
 
 
 @cache
-def sum_elements_kernel(precision: str) -> Any:
-    """Kernel: sums of elastic, plastic and hourglass energy; extremes of strain and Jacobian ratio.
+def sum_elements_kernel(precision: str, viscous: bool = False) -> Any:
+    """Kernel: sums of elastic, plastic and hourglass energy; extremes of strain and Jacobian ratio; viscosity's energy.
 
     `ranges` are first and end of the elements of each scene in each block. Runs continue from one block to the next, so
     that the order of summation does not depend on the other scenes of a batch.
@@ -106,6 +107,7 @@ def sum_elements_kernel(precision: str) -> Any:
         elastic = wp.float64(0.0)
         plastic = wp.float64(0.0)
         hourglass = wp.float64(0.0)
+        taken = wp.float64(0.0)
         largest = R(0.0)
         smallest = R(1.0)
         count = int(0)
@@ -119,6 +121,8 @@ def sum_elements_kernel(precision: str) -> Any:
                 elastic += wp.float64(energy[0, e])
                 plastic += wp.float64(energy[1, e])
                 hourglass += wp.float64(energy[4, e])
+                if wp.static(viscous):
+                    taken += wp.float64(energy[5, e])
                 largest = wp.max(largest, energy[2, e])
                 smallest = wp.min(smallest, energy[3, e])
             begin -= size
@@ -126,6 +130,8 @@ def sum_elements_kernel(precision: str) -> Any:
         elastic = block_sum(elastic)
         plastic = block_sum(plastic)
         hourglass = block_sum(hourglass)
+        if wp.static(viscous):
+            taken = block_sum(taken)
         greatest = wp.tile_max(wp.tile(largest))
         least = wp.tile_min(wp.tile(smallest))
         if lane == 0:
@@ -135,6 +141,8 @@ def sum_elements_kernel(precision: str) -> Any:
             partial_out[r, scene, wp.static(STRAIN), k] = wp.float64(greatest[0])
             partial_out[r, scene, wp.static(JACOBIAN), k] = wp.float64(least[0])
             partial_out[r, scene, wp.static(HOURGLASS), k] = hourglass
+            if wp.static(viscous):
+                partial_out[r, scene, wp.static(VISCOUS), k] = taken
 
     return sum_elements
 

@@ -14,6 +14,7 @@ from warp_mca.geometry.cell_types import CELL_TYPES
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.model.stable_step import Elements, StableStep, at_elements, element_steps, stable_step
+from warp_mca.model.viscosity import viscosities
 from warp_mca.physics.contact.surfaces import Faces, make_faces
 from warp_mca.physics.elements import Element
 from warp_mca.physics.elements.cells import Cells, body_cells, body_materials, densities, element_masses, sum_to_nodes
@@ -42,6 +43,8 @@ class Block:
         ends: where the elements of each scene of a batch end in the block; empty for one scene.
         part_ends: where elements end that have one level of `Model.rates` and one chain, the least level of their
             nodes: levels one after the other, in each of them chains; empty with one rate.
+        viscosity: c1 rho c h [Pa s] and c2^2 rho h^2 [Pa s^2] of each, see `kernels.elements.viscosity`, shape (2,
+            element_count), float64; None without bulk viscosity.
     """
 
     element: str
@@ -52,6 +55,12 @@ class Block:
     first: int
     ends: tuple[int, ...] = ()
     part_ends: tuple[int, ...] = ()
+    viscosity: Array | None = None
+
+    @property
+    def viscous(self) -> bool:
+        """Whether they have bulk viscosity."""
+        return self.viscosity is not None
 
     @property
     def level_ends(self) -> tuple[int, ...]:
@@ -65,9 +74,9 @@ class Block:
         return bool(self.law)
 
     @property
-    def kind(self) -> tuple[bool, str, str, bool]:
-        """Key of the block: (not plastic, law, element, finite). Blocks of a model are sorted by it."""
-        return not self.plastic, self.law, self.element, self.finite
+    def kind(self) -> tuple[bool, str, str, bool, bool]:
+        """Key of the block: (not plastic, law, element, finite, viscous). Blocks of a model are sorted by it."""
+        return not self.plastic, self.law, self.element, self.finite, self.viscous
 
 
 class Assembly:
@@ -148,9 +157,10 @@ class Assembly:
         They are those that are computed, or those of `rigid` bodies; `first` is the number of the first one.
         """
         blocks, order = [], [np.zeros(0, dtype=np.int32)]
+        viscosity = [None if rigid else viscosities(self, k) for k in range(len(self.cells))]
         for law in sorted({m.law for m in self.materials}, key=lambda law: (not law, law)):
             flowing = np.array([m.law == law for m in self.materials])[self.material]
-            for part in self.cells:
+            for k, part in enumerate(self.cells):
                 mine = np.flatnonzero(flowing[part.index] & (self.rigid[part.index] == rigid))
                 if len(mine):
                     if part.element.patches:
@@ -164,6 +174,7 @@ class Assembly:
                             conn=np.ascontiguousarray(part.conn[mine].T),
                             material=self.material[index],
                             first=first,
+                            viscosity=None if viscosity[k] is None else viscosity[k][:, mine],
                         )
                     )
                     order.append(index)

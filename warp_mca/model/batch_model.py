@@ -71,7 +71,7 @@ def _blocks(models: Sequence[Model], nodes: Index, elements: Index) -> tuple[tup
     blocks, order, first = [], [np.zeros(0, dtype=np.int32)], 0
     ranges = np.zeros((len(models), len(kinds), 2), dtype=np.int32)
     for column, kind in enumerate(kinds):
-        conn, material, end = [], [], first
+        conn, material, viscosity, end = [], [], [], first
         for k, model in enumerate(models):
             ranges[k, column] = end
             for block in model.blocks:
@@ -79,6 +79,7 @@ def _blocks(models: Sequence[Model], nodes: Index, elements: Index) -> tuple[tup
                     count = block.conn.shape[1]
                     conn.append(block.conn + nodes[k])
                     material.append(block.material + laws[k])
+                    viscosity += [] if block.viscosity is None else [block.viscosity]
                     order.append(model.element_of[block.first : block.first + count] + elements[k])
                     end += count
             ranges[k, column, 1] = end
@@ -87,6 +88,7 @@ def _blocks(models: Sequence[Model], nodes: Index, elements: Index) -> tuple[tup
                 next(block for model in models for block in model.blocks if block.kind == kind),
                 conn=np.ascontiguousarray(np.concatenate(conn, axis=1)),
                 material=np.concatenate(material),
+                viscosity=np.concatenate(viscosity, axis=1) if viscosity else None,
                 first=first,
                 ends=tuple((ranges[:, column, 1] - first).tolist()),
                 part_ends=(),  # of elements with steps of their own, which batches have not

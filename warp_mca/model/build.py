@@ -14,7 +14,7 @@ from warp_mca.model.assembly import Assembly
 from warp_mca.model.mass_scaling import check_masses, scale_masses
 from warp_mca.model.model import Model
 from warp_mca.model.own_steps import OwnSteps
-from warp_mca.model.stable_step import with_dashpots
+from warp_mca.model.viscosity import share_of_step, with_viscosity
 from warp_mca.physics.absorbing.nodes import absorbing_nodes
 from warp_mca.physics.contact.auto_penalty import ChosenPenalty, settled
 from warp_mca.physics.contact.axes import contact_axes
@@ -91,7 +91,6 @@ def build_model(
     check_loads(scene, chain, bases)
     for base in bases:
         pairs["joint_tied"][base.start : base.end] = 0.0
-    bodies = _bodies(parts, watched)
     held = constraints(parts, velocity)
     check_bindings(parts, joints, held, pairs)
     passes, axes, added, penalties = _contacts(parts, velocity)
@@ -101,10 +100,12 @@ def build_model(
     rigid = rigid_bodies(parts, pairs, joints, couplings, passes, velocity)
     check_ties(ties, held, [nodes_of(pairs), absorbing.node, *(body.nodes for body in rigid.bodies)])
     added, parts.relief = ties.shared(added, parts.mass), ties.relief(parts.mass)
-    found: dict[str, Any] = {**bodies, **_steps(parts, rigid.bodies, added, velocity, passes), **held, **pairs}
+    found: dict[str, Any] = {**_bodies(parts, watched), **_steps(parts, rigid.bodies, added, velocity, passes)}
     model = Model(
         V=velocity,
         **found,
+        **held,
+        **pairs,
         mass=ties.carried(parts.mass),
         joints=joints,
         couplings=soft,
@@ -120,7 +121,7 @@ def build_model(
         rigid_rows=rigid.rows,
         rigid_pins=rigid.pins,
     )
-    return grouping(model, OwnSteps(parts, added)) if grouping else model
+    return grouping(model, OwnSteps(parts, added, share_of_step(parts, velocity))) if grouping else model
 
 
 def _bodies(parts: Assembly, watched: Sequence[tuple[str, int]]) -> dict[str, Any]:
@@ -148,6 +149,6 @@ def _steps(
     """Stable step and mass scaling, by the name of the attribute; mass scaling raises the masses of the assembly."""
     plain = stable_with_rigid(parts, bodies, added, velocity) if bodies else parts.stable(added)
     stable, scaling = scale_masses(parts, added, plain)
-    stable = with_dashpots(stable, sum(item.decay for item in passes))
+    stable = with_viscosity(stable, parts, velocity, sum(item.decay for item in passes))
     check_masses(parts, scaling)
     return {"stable": stable, "scaling": scaling}

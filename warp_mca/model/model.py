@@ -125,6 +125,11 @@ class Model:
         return len(self.X)
 
     @property
+    def viscous(self) -> bool:
+        """Whether elements have bulk viscosity."""
+        return any(block.viscous for block in self.blocks)
+
+    @property
     def common_steps(self) -> int:
         """Steps that contacts and joints take in a step of the solver."""
         return self.rates.common_steps if self.rates else 1

@@ -28,8 +28,12 @@ class OwnSteps:
             float64.
     """
 
-    def __init__(self, parts: Assembly, added: Array) -> None:
-        """Bounds of all elements; `added` is what contact springs add to the eigenvalue at each node [1/s^2]."""
+    def __init__(self, parts: Assembly, added: Array, share: float = 1.0) -> None:
+        """Bounds of all elements; `added` is what contact springs add to the eigenvalue at each node [1/s^2].
+
+        `share` is what dashpots leave of the steps [-].
+        """
+        self.share = share
         self.step = parts.element_steps(added)
         self._exact = np.zeros(len(self.step), dtype=bool)
         self._parts = list(parts.computed(added))
@@ -41,6 +45,7 @@ class OwnSteps:
             base: time step of level 0 [s]; elements whose bound is shorter are on level 0.
             highest: level.
         """
+        base = base / self.share
         likely = self._levels(LOOSENESS * self.step, base, highest)
         self._find_exact((likely > self._levels(self.step, base, highest)) & ~self._exact)
         return self._levels(self.step, base, highest)

@@ -203,6 +203,9 @@ class ImpactPhase:
             grows [-], or the stable step itself, as "2e-8s".
         open_time: how long all contacts must be open for an impact to end, in a run of many phases [s]; None takes the
             longest period of bending of a link, see docs/theory.md.
+        bulk_viscosity: linear and quadratic coefficient of a viscous pressure [-], as (0.06, 1.2), or the linear one
+            alone; None: no viscosity. It damps vibration of the length of a cell, such as the ringing of flat contact,
+            for 6 % shorter steps at 0.06, and the energy that it takes is `damping`; see docs/theory.md.
     """
 
     duration: float
@@ -211,6 +214,7 @@ class ImpactPhase:
     energy_tolerance: float = 0.01
     mass_scaling: float | str | None = None
     open_time: float | None = None
+    bulk_viscosity: float | tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         validate.plain(self)
@@ -227,6 +231,19 @@ class ImpactPhase:
             validate.times("ImpactPhase", open_time=self.open_time)
         if not (validate.is_number(self.time_step_scale) and 0.0 < self.time_step_scale <= 1.0):
             raise bad_value("ImpactPhase.time_step_scale", self.time_step_scale, "must lie in (0, 1]")
+        if not (len(self.viscosity) == 2 and all(map(_is_coefficient, self.viscosity))):
+            remedy = "give a linear coefficient from 0 to 10, or that and a quadratic one as (0.06, 1.2)"
+            raise bad_value("ImpactPhase.bulk_viscosity", validate.brief(self.bulk_viscosity), remedy)
+
+    @property
+    def viscosity(self) -> tuple[float, float]:
+        """Linear and quadratic coefficient of bulk viscosity [-]; 0 without."""
+        given = 0.0 if self.bulk_viscosity is None else self.bulk_viscosity
+        return given if isinstance(given, tuple) else (given, 0.0)
+
+
+def _is_coefficient(value: object) -> bool:
+    return validate.is_number(value) and 0.0 <= value <= 10.0  # pyright: ignore[reportOperatorIssue]
 
 
 def is_mass_scaling(value: object) -> bool:

@@ -30,7 +30,7 @@ class RecordStage(Actor):
         self.element_ranges = wp.array(layout.elements, dtype=wp.int32)
         self.most_nodes = int(np.diff(layout.nodes).max())  # of any scene
         self.most_elements = int(np.diff(layout.elements).sum(axis=(1, 2)).max())
-        self.sum_elements_kernel = ledger.sum_elements_kernel(solver.precision)
+        self.sum_elements_kernel = ledger.sum_elements_kernel(solver.precision, solver.model.viscous)
 
     def record_kernels(self) -> list[Any]:
         """Those of sums, and of probes, sections and stresses that recorders show."""

@@ -31,6 +31,7 @@ from warp_mca.kernels.records.columns import (
     SPRING_ENERGY,
     SQUARES,
     STRAIN,
+    VISCOUS,
 )
 from warp_mca.model.columns import added_columns, column_count
 from warp_mca.step.records import SceneRecords
@@ -153,7 +154,7 @@ class Ledger:
             "contact": springs[..., SPRING_ENERGY].sum(axis=-1),
             "friction": springs[..., FRICTION].sum(axis=-1),
             "contact_loss": springs[..., LOST].sum(axis=-1),
-            "damping": springs[..., DAMPED].sum(axis=-1) + sums[..., -1],
+            "damping": springs[..., DAMPED].sum(axis=-1) + sums[..., VISCOUS] + sums[..., -1],
             "joint": sums[..., JOINT_HEAT],
             "absorbed": np.zeros(sums.shape[:-1]),
             "external_work": work,

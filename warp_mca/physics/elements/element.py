@@ -28,6 +28,8 @@ class Element(Protocol):
         one_rate: may be left out; True where forces depend on neighbouring elements too, so that all of a block take
             the same step.
         lags: may be left out; True where all of its hourglass energy is what internal vectors lose as they lag.
+        mean_gradients: may be left out where there is no bulk viscosity; x -> mean gradients of the shape functions
+            [1/m], shape (element_count, corners, 3). The maker of the force kernel then has a last argument `viscous`.
         oriented: may be left out; as `Hex8w.oriented`, where the order of the corners of cells matters.
     """
 

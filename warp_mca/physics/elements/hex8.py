@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from warp_mca.physics.elements.element import Array
-from warp_mca.physics.elements.hexahedron import eigenvalue_bounds, largest_eigenvalues, lumped_masses
+from warp_mca.physics.elements.hexahedron import eigenvalue_bounds, largest_eigenvalues, lumped_masses, mean_gradients
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Block
@@ -19,6 +19,7 @@ class Hex8:
     cell = "hexahedron"
     patches = True
     lumped_masses = staticmethod(lumped_masses)
+    mean_gradients = staticmethod(mean_gradients)
     eigenvalue_bounds = staticmethod(eigenvalue_bounds)
     largest_eigenvalues = staticmethod(largest_eigenvalues)
 

@@ -11,6 +11,7 @@ from warp_mca.physics.elements.hexahedron import (
     congruent,
     lumped_masses,
     mean_and_modes_bounds,
+    mean_gradients,
     mean_parts,
     mean_stiffness,
 )
@@ -76,6 +77,7 @@ class Hex8i:
     patches = True
     lags = True
     lumped_masses = staticmethod(lumped_masses)
+    mean_gradients = staticmethod(mean_gradients)
 
     def __init__(self, name: str = "hex8i", points: int = 8) -> None:
         self.name, self.points = name, points

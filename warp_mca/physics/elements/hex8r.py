@@ -11,6 +11,7 @@ from warp_mca.physics.elements.hexahedron import (
     congruent,
     lumped_masses,
     mean_and_modes_bounds,
+    mean_gradients,
     mean_parts,
     mean_stiffness,
 )
@@ -68,6 +69,7 @@ class Hex8r:
     cell = "hexahedron"
     patches = True
     lumped_masses = staticmethod(lumped_masses)
+    mean_gradients = staticmethod(mean_gradients)
 
     def eigenvalue_bounds(self, x: Array, K: Array, G: Array, mass: Array, coarse: bool = False) -> Array:
         """Sum of bounds of the mean strain's part, as for hex8 with 3 x 3 problems, and of the hourglass part."""

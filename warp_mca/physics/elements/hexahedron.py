@@ -139,6 +139,11 @@ def mean_parts(x: Array) -> tuple[Array, Array, Array, Array]:
     return b, volume, gamma, np.einsum("ak,eai->eki", CORNERS, x) / 8.0
 
 
+def mean_gradients(x: Array) -> Array:
+    """Mean gradients of the shape functions [1/m], shape (element_count, 8, 3); x as in `mean_parts`."""
+    return mean_parts(x)[0]
+
+
 def mean_stiffness(b: Array, volume: Array, K: Array, G: Array) -> Array:
     """Stiffness of the mean strain [N/m], shape (n, 24, 24); arguments as `mean_parts` gives them."""
     n = len(b)

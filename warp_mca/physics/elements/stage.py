@@ -13,6 +13,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.kernels.elements.patch_layout import PATCH
+from warp_mca.kernels.elements.viscosity import DILATATION, LINEAR, QUADRATIC, TAKEN, UNKNOWN, VISCOUS_ROWS
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.simd import vectorised
 from warp_mca.kernels.materials.laws import ROWS, law_functions, row_count
@@ -51,8 +52,8 @@ class ElementStage:
         block: the host side.
         index: of the block in the model; its state is `State.elements[index]`.
         conn, material: as in `Block`.
-        dt: time step of level 0 [s], for laws that depend on rates; 0, as it is at first, asks for the stress of the
-            history as it stands.
+        dt: time step of level 0 [s], for viscosity and laws that depend on rates; 0, as it is at first, asks for the
+            stress of the history as it stands.
         points: integration points that keep a history.
         lags: whether internal vectors lag behind, see `ElementState.extreme`.
         kept: kinds of what the history of an element holds, of `kernels.materials.laws.ROWS`, point by point.
@@ -87,8 +88,8 @@ class ElementStage:
         self.lags = hasattr(kernels, "lags") and kernels.lags(self.law, block.finite)
         self.real = scalars(precision).real
         self.no_nodes = [wp.zeros((0, 0), dtype=wp.int32), wp.zeros(0, dtype=self.real)]
-        kind = (precision, block.law, block.finite)
-        self.force_kernel = vectorised(kernels.force_kernel(*kind), large=block.finite or points > 1)
+        kind, viscous = (precision, block.law, block.finite), [True] * block.viscous
+        self.force_kernel = vectorised(kernels.force_kernel(*kind, *viscous), large=block.finite or points > 1)
         self.energy_kernel = vectorised(kernels.energy_kernel(*kind), large=block.finite)
         self.stress_kernel = vectorised(kernels.stress_kernel(*kind), large=block.finite)
 
@@ -106,10 +107,13 @@ class ElementStage:
 
     def new_state(self) -> ElementState:
         """State of elements that have never flowed, on the current device."""
+        extreme = np.zeros((VISCOUS_ROWS if self.block.viscous else 3 if self.lags else 2, self.count))
+        if self.block.viscous:
+            extreme[DILATATION], extreme[[LINEAR, QUADRATIC]] = UNKNOWN, self.block.viscosity
         return ElementState(
             yielded=wp.zeros(self.count if self.block.plastic else 0, dtype=wp.int32),
             history=wp.zeros((row_count(self.kept), self.count if self.kept else 0), dtype=self.real),
-            extreme=wp.zeros((3 if self.lags else 2, self.count), dtype=self.real),
+            extreme=wp.array(extreme, dtype=self.real),
         )
 
     def rotated(self, history: NDArray, rotation: NDArray[np.float64]) -> NDArray:
@@ -178,7 +182,8 @@ class ElementStage:
 
         if chain is None:
             count = self.count if level is None else self.active(level)
-            ends = [end for end in self.block.level_ends if end < count] if self.law.general else []
+            rates = self.law.general or self.block.viscous  # which have the step of their level
+            ends = [end for end in self.block.level_ends if end < count] if rates else []
             for first, end in pairwise([0, *ends, count]):
                 split(end - first, partial(launch_from, first), ELEMENTS)
             return
@@ -189,6 +194,7 @@ class ElementStage:
     def energies(self, work: Workspace, state: State, split: Split = whole, u: wp.array | None = None) -> None:
         """Rows elastic, plastic energy [J]; greatest strain, smallest Jacobian ratio so far [-]; hourglass energy [J].
 
+        Of viscous blocks, in the last row, the energy that viscosity took [J].
         To be called after `launch` of the same step; u are the displacements of that [m], if not those of the state.
         """
         own = state.elements[self.index]
@@ -197,8 +203,10 @@ class ElementStage:
         def launch(part: slice) -> None:
             inputs = [work.X, self.conn[:, part], self.material[part], work.law, *self._history(own, part)]
             inputs += [own.extreme[:, part], seen, self.block.first + part.start, *self.nodal(part)]
-            count = part.stop - part.start
+            count, first = part.stop - part.start, self.block.first + part.start
             wp.launch(self.energy_kernel, count, inputs=inputs, outputs=[work.energy], block_dim=BLOCK_DIM)
+            if self.block.viscous:
+                wp.copy(work.energy[5, first : first + count], own.extreme[TAKEN, part])
 
         split(self.count, launch, ELEMENTS)
 

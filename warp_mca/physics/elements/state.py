@@ -17,8 +17,8 @@ class ElementState:
             point by point, then what the element keeps besides, shape (row_count, element_count), float32 or float64;
             empty where elastic.
         extreme: greatest square of the deviatoric strain and greatest loss of volume 1 - J of any step [-], from 0 on;
-            where internal vectors lag behind, the energy that this took [J]; shape (2 or 3, element_count), float32 or
-            float64.
+            where internal vectors lag behind, the energy that this took [J]; of viscous elements, what
+            `kernels.elements.viscosity` lists; shape (row_count, element_count), float32 or float64.
     """
 
     yielded: wp.array

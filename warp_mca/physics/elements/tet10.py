@@ -36,6 +36,11 @@ class Tet10:
         """1/36 of the mass at each corner and 4/27 at each edge."""
         return (rho * volumes(x))[:, None] * SHARES
 
+    def mean_gradients(self, x: Array) -> Array:
+        """Weighted means over the points."""
+        weight = determinants(x)
+        return np.einsum("eg,egai->eai", weight, gradients(x)) / weight.sum(axis=1)[:, None, None]
+
     def eigenvalue_bounds(self, x: Array, K: Array, G: Array, mass: Array, coarse: bool = False) -> Array:
         """Bounds without the mean of the dilatation, which only takes energy away.
 

@@ -59,14 +59,19 @@ def _stress(strain: Array, K: Array, G: Array) -> Array:
     return found
 
 
-def _strains(x: Array, K: Array, G: Array, scale: Array) -> tuple[list[tuple[float, Array]], Array]:
-    """Parts of the strain that are orthogonal over the points: weight and rows for each corner and direction, shape (n,
-    6, 18); volumes, shape (n,)."""
+def _mean_parts(x: Array) -> tuple[Array, Array, Array]:
+    """Patterns of corners x [m] and mean gradients of these [1/m], shape (n, 5, 3); volumes [m^3], shape (n,)."""
     p = np.einsum("pa,eai->epi", _PATTERNS, x)
     b = np.cross(p[:, [1, 2, 0, 4, 2]], p[:, [2, 0, 1, 2, 3]]) / np.array([1.0, 1.0, 1.0, 3.0, 3.0])[:, None]
     b[:, 2] += np.cross(p[:, 3], p[:, 4]) / 3.0
     volume = np.einsum("ei,ei->e", b[:, 2], p[:, 2])
-    b /= volume[:, None, None]
+    return p, b / volume[:, None, None], volume
+
+
+def _strains(x: Array, K: Array, G: Array, scale: Array) -> tuple[list[tuple[float, Array]], Array]:
+    """Parts of the strain that are orthogonal over the points: weight and rows for each corner and direction, shape (n,
+    6, 18); volumes, shape (n,)."""
+    p, b, volume = _mean_parts(x)
     base = p[:, :3]
     r, s, z = np.linalg.inv(base).transpose(2, 0, 1)
     gamma = (np.eye(5)[3:] - np.einsum("emi,epi->emp", p[:, 3:], b)) @ _PATTERNS * scale[:, None]
@@ -100,6 +105,10 @@ class Wedge6:
         slopes = p[:, 0] + zeta * p[:, 3], p[:, 1] + zeta * p[:, 4], p[:, 2] + r * p[:, 3] + s * p[:, 4]
         det = np.einsum("egi,egi->eg", np.cross(slopes[0], slopes[1]), slopes[2])
         return (rho[:, None] / 6.0) * (det @ _SHAPE)
+
+    def mean_gradients(self, x: Array) -> Array:
+        """By the mean gradients of its patterns."""
+        return np.einsum("pa,epi->eai", _PATTERNS, _mean_parts(x)[1])
 
     def eigenvalue_bounds(self, x: Array, K: Array, G: Array, mass: Array, coarse: bool = False) -> Array:
         """Norms: of the eighth power, or coarse ones of the matrix."""
