@@ -126,8 +126,7 @@ def small_strain_function(precision: str, law_name: str, viscous: bool = False) 
             volume += det
             dilatation += trace
             shear = G / det
-            direct = shear + shear
-            S = deviator(direct, shear, R(THIRD) * trace, xx, yy, zz, xy, yz, xz)
+            S = deviator(shear + shear, shear, R(THIRD) * trace, xx, yy, zz, xy, yz, xz)
             largest = wp.max(largest, invariant(S))
             if wp.static(plastic):
                 S, dp = flow_at(S, G, history_place(g), e, m, flag, law, history_out)
