@@ -96,8 +96,8 @@ def test_a_block_dropped_on_a_soft_pad():
 
 
 @pytest.mark.parametrize("element", ["hex8", "hex8r", "tet4", "tet10"])
-@pytest.mark.parametrize("yields", [True, False])
-def test_the_force_through_a_section_is_what_accelerates_the_other_side(element, yields):
+@pytest.mark.parametrize(("yields", "viscosity"), [(True, None), (False, None), (True, (0.1, 1.2))])
+def test_the_force_through_a_section_is_what_accelerates_the_other_side(element, yields, viscosity):
     """Between rows of one step its trapezoidal sum is the change of momentum of the nodes on the upper side."""
     metal = mca.J2Bilinear(E=210e9, nu=0.3, rho=7850.0, sigma_y=100e6, E_t=2e9)
     body = mca.Body(
@@ -113,7 +113,7 @@ def test_the_force_through_a_section_is_what_accelerates_the_other_side(element,
         contacts=(mca.Contact(slave=mca.Surface(body="bar", nodes="xmin"), master=mca.RigidPlane(normal=(1, 0, 0))),),
         tip=None,
         sections=(mca.Section(name="cut", body="bar", at=(0.007, 0.005, 0.005), normal=(1.0, 0.3, 0.0)),),
-        impact=mca.ImpactPhase(duration=6e-6, output_interval=4e-8),
+        impact=mca.ImpactPhase(duration=6e-6, output_interval=4e-8, bulk_viscosity=viscosity),
     )
     impact = begun(scene, precision="float64")
     assert impact.steps.per_interval == 1

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 from impacts import Displaced, begun, finished, momentum, result_of
 from linear_tet import LinearTet
 from test_bending import grid
+from test_cycle import scene as cycle_scene
 
 import warp_mca as mca
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.model.build import build_model
 from warp_mca.model.model import Model
+from warp_mca.phases.cycle import Cycle
+from warp_mca.phases.prepare import Request
+from warp_mca.phases.settings import Settings
 from warp_mca.physics.elements import ELEMENTS
 from warp_mca.physics.elements.cells import nodal_masses
 from warp_mca.rigid.handoff import hand_off
+from warp_mca.scene import model_file
 from warp_mca.step.solver import Solver
 
 STEEL = mca.Elastic(E=200e9, nu=0.3, rho=7800.0)
@@ -177,6 +185,20 @@ def test_flat_contact_rings_less():
     assert impulse[0.06] == pytest.approx(impulse[None], rel=0.02)
 
 
+@pytest.mark.parametrize("element", ["hex8i", "hex8", "tet10"])
+@pytest.mark.parametrize("cells", [20, 40])
+def test_the_greatest_force_of_flat_contact_is_rho_c_v_A(element: str, cells: int):
+    """With springs no stiffer than a cell: c1 = 0.1 keeps it within 5 %, c1 = 0.06 leaves 5.01 % to `hex8` of 20 cells."""
+    made = bar(element, 0.1, cells, output_interval=2e-7)
+    made = replace(made, contacts=(replace(made.contacts[0], penalty=1.0),))
+    result = result_of(finished(made))
+    force = 7800.0 * np.sqrt(200e9 / 7800.0) * 1e-4
+    inside = (result.time > 8e-6) & (result.time < 3.2e-5)
+    assert 1.0 < result.summary["extremes"]["F_n_max"] / force < 1.05
+    assert result.F_n[inside].mean() == pytest.approx(force, rel=2e-3)
+    assert result.F_n[inside].std() < 0.02 * force
+
+
 def test_the_quadratic_part_acts_in_fast_compression_alone():
     """A block that shrinks, and grows: q = theta_dot (lin - quad theta_dot) with theta_dot < 0."""
     model = assembled(block(viscosity=(0.1, 1.2)))
@@ -223,7 +245,7 @@ def test_scenes_side_by_side_with_and_without():
     assert np.array_equal(ledgers[0].table(), alone.scene_runs[0].ledger.table())
 
 
-def test_a_run_goes_on_from_its_state_to_the_same_bits(tmp_path):
+def test_a_run_goes_on_from_its_state_to_the_same_bits(tmp_path: Path):
     whole, first = begun(bar()), begun(bar())
     first.advance(until=whole.steps.count // 3)
     first.save(tmp_path / "state")
@@ -252,3 +274,25 @@ def test_none_and_zero_are_the_same():
         assert not model.viscous
         assert model.stable.dt == assembled(block(viscosity=None)).stable.dt
     assert assembled(block(viscosity=0.06)).stable.dt / model.stable.dt == pytest.approx(0.942, abs=0.001)
+
+
+def test_impacts_follow_each_other_with_viscosity():
+    """Shapes settle without it, and the next impact begins without a rate."""
+    scene = cycle_scene("single_link", rigid_inertia="mesh")
+    scene = replace(scene, impact=replace(scene.impact, bulk_viscosity=0.06))
+    result = Cycle(scene, None, Request(span=1.5e-3, settings=Settings("cpu", "float64", 1))).run()
+    assert [phase["kind"] for phase in result.summary["phases"]] == ["rigid", "impact", "rigid", "impact", "rigid"]
+    taken = [phase["energy"]["damping"] for phase in result.summary["phases"]]
+    assert 0.0 == taken[0] < taken[1] == taken[2] < taken[3] == taken[4]
+    assert result.summary["energy_error"] < 1e-4
+
+
+def test_a_model_file_keeps_it(tmp_path: Path):
+    for k, given in enumerate((None, 0.06, (0.06, 1.2))):
+        model_file.save(tmp_path / f"{k}.mca", bar(viscosity=given), mca.mesh(bar()))
+        assert model_file.load(tmp_path / f"{k}.mca").scene.impact.bulk_viscosity == given
+
+
+def test_two_link_takes_it_as_a_parameter():
+    assert mca.make_scene("two_link").impact.bulk_viscosity is None
+    assert mca.make_scene("two_link", bulk_viscosity=0.06).impact.bulk_viscosity == 0.06

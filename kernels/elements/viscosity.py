@@ -27,7 +27,7 @@ UNKNOWN = -2.0  # in place of J - 1 before the first step
 def viscosity_function(precision: str, finite: bool, viscous: bool = True) -> Any:
     """The function (e, J - 1, volume, dt, extreme_out) -> q [Pa], which goes with dJ; it keeps the energy taken.
 
-    Of elements that are not viscous it is `NOTHING`.
+    Without a time step it is that of the step before; of elements that are not viscous, `NOTHING`.
     """
     R = scalars(precision).real
 
@@ -36,11 +36,13 @@ def viscosity_function(precision: str, finite: bool, viscous: bool = True) -> An
         q = R(NOTHING)
         if wp.static(viscous):
             before = extreme_out[DILATATION, e]
-            change = wp.where(before > R(-1.5), theta - before, R(0.0))
-            rate = change / dt
+            moves = dt > R(0.0)
+            change = wp.where(moves and before > R(-1.5), theta - before, R(0.0))
+            rate = change / wp.where(moves, dt, R(1.0))
             if wp.static(finite):
                 rate = rate / (R(1.0) + theta)
             q = rate * (extreme_out[LINEAR, e] + extreme_out[QUADRATIC, e] * wp.max(-rate, R(0.0)))
+            q = wp.where(moves, q, extreme_out[VISCOUS_PRESSURE, e])
             work = R(0.5) * (extreme_out[VISCOUS_PRESSURE, e] + q) * change * volume
             extreme_out[DILATATION, e] = theta
             extreme_out[VISCOUS_PRESSURE, e] = q

@@ -90,7 +90,7 @@ def resultants_kernel(precision: str, turned: bool) -> Any:
 
 @cache
 def history_kernel(precision: str) -> Any:
-    """Kernel: copy yield flags and history of some elements, for kernels that repeat their forces."""
+    """Kernel: copy yield flags, if any, and history or extremes of some elements, whose forces are repeated."""
     R = scalars(precision).real
 
     @wp.kernel(enable_backward=False, module="unique")
@@ -104,7 +104,7 @@ def history_kernel(precision: str) -> Any:
         k, j = wp.tid()
         e = element[j]
         history_out[k, j] = history[k, e]
-        if k == 0:
+        if k == 0 and yielded_out.shape[0] > 0:
             yielded_out[j] = yielded[e]
 
     return copy_history

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +56,16 @@ class Block:
     ends: tuple[int, ...] = ()
     part_ends: tuple[int, ...] = ()
     viscosity: Array | None = None
+
+    def part(self, element: NDArray[np.intp]) -> Block:
+        """A block of some of the elements by themselves."""
+        viscosity = None if self.viscosity is None else self.viscosity[:, element]
+        conn, material = np.ascontiguousarray(self.conn[:, element]), self.material[element]
+        return replace(self, conn=conn, material=material, viscosity=viscosity, first=0, ends=(), part_ends=())
+
+    def without_viscosity(self) -> Block:
+        """The block with coefficients of zero, if it has any: its kernels and its `kind` stay."""
+        return self if self.viscosity is None else replace(self, viscosity=0.0 * self.viscosity)
 
     @property
     def viscous(self) -> bool:

@@ -104,9 +104,7 @@ def grouped(model: Model, level: Levels, rates: Rates) -> Model:
             found.append(mine)
         place = np.concatenate(found)
         ends = tuple(np.cumsum([len(part) for part in found]).tolist())
-        conn = np.ascontiguousarray(block.conn[:, place])
-        viscosity = None if block.viscosity is None else block.viscosity[:, place]
-        blocks.append(replace(block, conn=conn, material=block.material[place], viscosity=viscosity, part_ends=ends))
+        blocks.append(replace(block.part(place), first=block.first, part_ends=ends))
         order.append(model.element_of[_part(block)][place])
     rest = model.element_of[model.element_count :]  # of rigid bodies
     return replace(model, blocks=tuple(blocks), element_of=np.concatenate([*order, rest]), rates=rates)

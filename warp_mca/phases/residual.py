@@ -59,7 +59,7 @@ class Relaxation:
 
     def __init__(self, model: Model, settings: Settings) -> None:
         """Allocate a solver in float64 on the device of the `settings`."""
-        blocks = tuple(replace(block, viscosity=None) for block in model.blocks)
+        blocks = tuple(block.without_viscosity() for block in model.blocks)
         self.model = model = replace(model, rates=None, blocks=blocks)
         dt = model.stable.dt  # of any length: no step is taken
         self.solver = Solver(model, device=settings.device, precision="float64", dt=dt, threads=settings.threads)

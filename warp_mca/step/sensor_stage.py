@@ -8,7 +8,7 @@ copies of their histories: the slots of the step itself may hold sums over eleme
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any
 
@@ -183,9 +183,7 @@ class _Sections:
                 continue
             block, own = solver.model.blocks[k], mine[chosen]
             element, counted = _with_neighbours(block, own)
-            conn = np.ascontiguousarray(block.conn[:, element])
-            part = replace(block, conn=conn, material=block.material[element], first=0, ends=(), part_ends=())
-            stage = ELEMENTS[block.element].stage(part, solver.model.X, solver.precision)
+            stage = ELEMENTS[block.element].stage(block.part(element), solver.model.X, solver.precision)
             stage.slot = self._slots
             self.layers.append(_Layer(k, _ints(element), stage, stage.new_state()))
             on_cut = np.isin(stage.slot_node, shared)
@@ -206,6 +204,9 @@ class _Sections:
             if len(own.yielded):
                 inputs = [layer.element, source.yielded, source.history]
                 wp.launch(self.copy_kernel, own.history.shape, inputs=inputs, outputs=[own.yielded, own.history])
+            if layer.stage.block.viscous:
+                inputs = [layer.element, source.yielded, source.extreme]
+                wp.launch(self.copy_kernel, own.extreme.shape, inputs=inputs, outputs=[own.yielded, own.extreme])
             view: Any = _View(work.X, work.law, self.force, work.displacements(state), [own])
             layer.stage.launch(view, view)
         inputs = [work.row, self.offset, self.slot, self.node, self.weight, work.X, state.u, self.force]
