@@ -21,7 +21,7 @@ def short_ranges(monkeypatch):
         monkeypatch.setattr(name, length)
 
 
-def scene(element: str = "hex8", **impact: float) -> mca.Scene:
+def scene(element: str = "hex8", **impact: float | None) -> mca.Scene:
     """Two hinged bars that yield fly aslant into a rough plate; no number of elements is a multiple of a range."""
     metal = mca.J2Bilinear(E=70e9, nu=0.3, rho=2700.0, sigma_y=5e6, E_t=7e9, beta=0.3)
     flight = {"material": metal, "velocity": (1.0, -3.0, 0.5), "element": element}
@@ -48,11 +48,22 @@ def scene(element: str = "hex8", **impact: float) -> mca.Scene:
 
 
 @pytest.mark.parametrize(
-    ("element", "interval"), [("hex8", 1e-6), ("hex8r", 1e-6), ("tet4", 1e-6), ("tet10", 1e-6), ("hex8", 1e-5)]
+    ("element", "interval", "viscosity"),
+    [
+        ("hex8", 1e-6, None),
+        ("hex8r", 1e-6, None),
+        ("tet4", 1e-6, None),
+        ("tet10", 1e-6, None),
+        ("hex8", 1e-5, None),
+        ("hex8", 1e-6, 0.06),
+        ("tet4", 1e-6, 0.06),
+    ],
 )
-def test_histories_are_the_same_bit_for_bit(element, interval):
+def test_histories_are_the_same_bit_for_bit(element, interval, viscosity):
     """Also where checks lie between two rows."""
-    one, *others = [mca.run(scene(element, output_interval=interval), threads=count) for count in (1, 2, 3)]
+    made = scene(element, output_interval=interval, bulk_viscosity=viscosity)
+    one, *others = [mca.run(made, threads=count) for count in (1, 2, 3)]
+    assert (one.summary["energy"]["damping"] > 0.0) == (viscosity is not None)
     assert one.summary["extremes"]["F_n_max"] > 100.0
     assert one.summary["max_plastic_strain"] > 1e-4
     assert one["E_friction"][-1] > 0.0

@@ -188,7 +188,7 @@ def test_flat_contact_rings_less():
 @pytest.mark.parametrize("element", ["hex8i", "hex8", "tet10"])
 @pytest.mark.parametrize("cells", [20, 40])
 def test_the_greatest_force_of_flat_contact_is_rho_c_v_A(element: str, cells: int):
-    """With springs no stiffer than a cell: c1 = 0.1 keeps it within 5 %, c1 = 0.06 leaves 5.01 % to `hex8` of 20 cells."""
+    """With springs no stiffer than a cell: c1 = 0.1 keeps within 5 %, 0.06 leaves 5.01 % to `hex8` of 20 cells."""
     made = bar(element, 0.1, cells, output_interval=2e-7)
     made = replace(made, contacts=(replace(made.contacts[0], penalty=1.0),))
     result = result_of(finished(made))

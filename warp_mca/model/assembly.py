@@ -167,10 +167,10 @@ class Assembly:
         They are those that are computed, or those of `rigid` bodies; `first` is the number of the first one.
         """
         blocks, order = [], [np.zeros(0, dtype=np.int32)]
-        viscosity = [None if rigid else viscosities(self, k) for k in range(len(self.cells))]
+        every = [None if rigid else viscosities(self, k) for k in range(len(self.cells))]
         for law in sorted({m.law for m in self.materials}, key=lambda law: (not law, law)):
             flowing = np.array([m.law == law for m in self.materials])[self.material]
-            for k, part in enumerate(self.cells):
+            for part, viscosity in zip(self.cells, every, strict=True):
                 mine = np.flatnonzero(flowing[part.index] & (self.rigid[part.index] == rigid))
                 if len(mine):
                     if part.element.patches:
@@ -184,7 +184,7 @@ class Assembly:
                             conn=np.ascontiguousarray(part.conn[mine].T),
                             material=self.material[index],
                             first=first,
-                            viscosity=None if viscosity[k] is None else viscosity[k][:, mine],
+                            viscosity=None if viscosity is None else viscosity[:, mine],
                         )
                     )
                     order.append(index)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 LARGEST = 0.98  # share of the step that is stable for certain which a viscous model takes at most
 
 
-def element_lengths(cells: Cells, X: Array, mass: Array) -> Array:
+def element_lengths(mean_gradients: Callable[[Array], Array], cells: Cells, X: Array, mass: Array) -> Array:
     """Length of each cell that bulk viscosity goes by [m], shape (cell_count,), float64.
 
     h^2 = 12 / (sum of m_a times sum of |b_a|^2 / m_a), with the gradient b_a of the mean dilatation: an element of bulk
@@ -27,13 +28,14 @@ def element_lengths(cells: Cells, X: Array, mass: Array) -> Array:
     h^2 = 3 / (1/a^2 + 1/b^2 + 1/c^2), a cube its edge.
 
     Args:
+        mean_gradients: as in `Element`.
         cells: of one formulation.
         X: positions of nodes [m], shape (node_count, 3), float64.
         mass: lumped masses [kg], shape (cell_count, corners), float64.
     """
     found = np.empty(len(mass))
     for part in chunks(len(found), CHUNK):
-        b = cells.element.mean_gradients(X[cells.conn[part]])
+        b = mean_gradients(X[cells.conn[part]])
         found[part] = ((b**2).sum(axis=2) / mass[part]).sum(axis=1) * mass[part].sum(axis=1)
     return np.sqrt(12.0 / found)
 
@@ -47,11 +49,12 @@ def viscosities(parts: Assembly, k: int) -> Array | None:
     cells, (linear, quadratic) = parts.cells[k], parts.scene.impact.viscosity
     if not (linear or quadratic) or parts.rigid[cells.index].all():
         return None
-    if not hasattr(cells.element, "mean_gradients"):
+    mean_gradients = getattr(cells.element, "mean_gradients", None)
+    if mean_gradients is None:
         remedy = f"{cells.element.name} has no bulk viscosity; leave it out, or choose another element"
         raise bad_value("ImpactPhase.bulk_viscosity", parts.scene.impact.bulk_viscosity, remedy)
     mass = parts.element_mass[k] if parts.relief is None else parts.element_mass[k] / parts.relief[cells.conn]
-    h, rho = element_lengths(cells, parts.X, mass), parts.rho[cells.index]
+    h, rho = element_lengths(mean_gradients, cells, parts.X, mass), parts.rho[cells.index]
     c = np.sqrt((parts.K[cells.index] + 4.0 / 3.0 * parts.G[cells.index]) / rho)
     return np.stack([linear * rho * c * h, quadratic**2 * rho * h**2])
 

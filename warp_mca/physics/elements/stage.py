@@ -108,7 +108,7 @@ class ElementStage:
     def new_state(self) -> ElementState:
         """State of elements that have never flowed, on the current device."""
         extreme = np.zeros((VISCOUS_ROWS if self.block.viscous else 3 if self.lags else 2, self.count))
-        if self.block.viscous:
+        if self.block.viscosity is not None:
             extreme[DILATATION], extreme[[LINEAR, QUADRATIC]] = UNKNOWN, self.block.viscosity
         return ElementState(
             yielded=wp.zeros(self.count if self.block.plastic else 0, dtype=wp.int32),
