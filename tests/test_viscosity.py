@@ -296,3 +296,16 @@ def test_a_model_file_keeps_it(tmp_path: Path):
 def test_two_link_takes_it_as_a_parameter():
     assert mca.make_scene("two_link").impact.bulk_viscosity is None
     assert mca.make_scene("two_link", bulk_viscosity=0.06).impact.bulk_viscosity == 0.06
+
+
+@pytest.mark.gpu
+@pytest.mark.parametrize("element", ["hex8i", "hex8", "hex8r", "tet4", "tet10"])
+def test_a_gpu_takes_the_same_energy(element: str):
+    taken = []
+    for device in ("cpu", "cuda:0"):
+        impact = begun(bar(element), device=device)
+        impact.advance()
+        assert impact.stopped == [None]
+        taken.append(impact.scene_runs[0].ledger.energy()["damping"])
+        assert impact.scene_runs[0].ledger.kept.energy_error < 1e-3
+    assert taken[1] == pytest.approx(taken[0], rel=0.01)

@@ -100,12 +100,11 @@ def build_model(
     rigid = rigid_bodies(parts, pairs, joints, couplings, passes, velocity)
     check_ties(ties, held, [nodes_of(pairs), absorbing.node, *(body.nodes for body in rigid.bodies)])
     added, parts.relief = ties.shared(added, parts.mass), ties.relief(parts.mass)
-    found: dict[str, Any] = {**_bodies(parts, watched), **_steps(parts, rigid.bodies, added, velocity, passes)}
+    found: dict[str, Any] = {**_bodies(parts, watched), **held, **pairs}
+    found |= _steps(parts, rigid.bodies, added, velocity, passes)
     model = Model(
         V=velocity,
         **found,
-        **held,
-        **pairs,
         mass=ties.carried(parts.mass),
         joints=joints,
         couplings=soft,
