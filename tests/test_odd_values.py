@@ -47,6 +47,8 @@ SOUND: dict[type, Any] = {
     mca.RigidPlane: WALL,
     mca.Contact: mca.Contact(slave=mca.Surface(body="up", nodes="ymin"), master=TOP, mu=0.3, penalty=1.0),
     mca.Penalty: mca.Penalty(),
+    mca.DecayingFriction: mca.DecayingFriction(kinetic=0.2, decay=2.0),
+    mca.ShearCap: mca.ShearCap(tau_max=1e8),
     mca.Revolute: mca.Revolute(name="O", body="up", at=(0.0, 0.0, 0.0)),
     mca.Weld: mca.Weld(name="W", body="up", nodes="ymax"),
     mca.Spherical: mca.Spherical(name="S", body="up", at=(0.0, 0.0, 0.0)),
@@ -162,6 +164,8 @@ def scene_with(item: Any) -> mca.Scene:
             change = {"joints": (item,)}
         case mca.Penalty():
             change = {"contacts": (dataclasses.replace(SOUND[mca.Contact], law=item),)}
+        case mca.DecayingFriction() | mca.ShearCap():
+            change = {"contacts": (dataclasses.replace(SOUND[mca.Contact], friction=item),)}
         case mca.Surface() | mca.RigidPlane():
             change = {"contacts": (dataclasses.replace(SOUND[mca.Contact], master=item),)}
         case mca.Line():

@@ -48,14 +48,32 @@ MUTATIONS: dict[str, Mutation] = {
     "friction_limit_doubled": Mutation(
         "friction may reach 2 mu F_n",
         "kernels/contact/spring.py",
-        "normal, mu * Fn, k)",
-        "normal, wp.float64(2.0) * mu * Fn, k)",
+        "limit = mu * Fn",
+        "limit = wp.float64(2.0) * mu * Fn",
     ),
     "friction_limit_halved": Mutation(
         "friction may reach only mu F_n / 2",
         "kernels/contact/spring.py",
-        "normal, mu * Fn, k)",
-        "normal, wp.float64(0.5) * mu * Fn, k)",
+        "limit = mu * Fn",
+        "limit = wp.float64(0.5) * mu * Fn",
+    ),
+    "friction_does_not_decay": Mutation(
+        "laws of friction see a block at rest",
+        "kernels/contact/friction_laws.py",
+        "speed = wp.length(du - wp.dot(du, normal) * normal) / dt",
+        "speed = wp.float64(0.0)",
+    ),
+    "friction_decays_too_fast": Mutation(
+        "laws of friction see ten times the speed",
+        "kernels/contact/friction_laws.py",
+        "speed = wp.length(du - wp.dot(du, normal) * normal) / dt",
+        "speed = wp.float64(10.0) * wp.length(du - wp.dot(du, normal) * normal) / dt",
+    ),
+    "caps_on_whole_faces": Mutation(
+        "a node has the area of all faces around it",
+        "warp_mca/physics/contact/friction_laws.py",
+        "share = slave.area / np.where(triangle, 3.0, 4.0)",
+        "share = slave.area",
     ),
     "slip_work_halved": Mutation(
         "half of the work of slip is counted",

@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.contact.laws import LINEAR
+from warp_mca.kernels.contact.laws import PLAIN, Laws
 from warp_mca.kernels.contact.nearest import Master, nearest_face
 from warp_mca.kernels.contact.search import STALE, TOO_DEEP, moved_too_far
 from warp_mca.kernels.contact.settle import meet_side, settle_functions
@@ -22,7 +22,7 @@ LANES = 4  # GPU threads per master node, which share the faces around it
 
 @cache
 def surface_kernel(
-    friction: bool, each: bool, stress_free: bool = False, law: str = LINEAR, noted: bool = False
+    friction: bool, each: bool, stress_free: bool = False, laws: Laws = PLAIN, noted: bool = False
 ) -> Any:
     """Kernel: push each slave node that penetrates a candidate face back along the normal of that face.
 
@@ -33,10 +33,10 @@ def surface_kernel(
     The stiffness of a spring is that of the node or of the face that it touches first, whichever is lower. It falls
     where the node slides on to a softer face, and the energy that the spring loses then is booked; it does not rise
     until the spring opens.
-    `stress_free`: springs of bodies that overlap at the start begin without force. `law` names the module of the
-    contact law. `noted`: keep the recent force on each node, which masters with several sides need.
+    `stress_free`: springs of bodies that overlap at the start begin without force. `noted`: keep the recent force on
+    each node, which masters with several sides need.
     """
-    settle, let_go = settle_functions(friction, stress_free, law)
+    settle, let_go = settle_functions(friction, stress_free, laws)
     pressure = pressure_function(friction)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
 
@@ -151,10 +151,10 @@ react_kernel(False, 1)  # this variant belongs to the module, so it must exist b
 
 
 @cache
-def plane_kernel(friction: bool, each: bool, stress_free: bool = False, law: str = LINEAR) -> Any:
+def plane_kernel(friction: bool, each: bool, stress_free: bool = False, laws: Laws = PLAIN) -> Any:
     """Kernel: contact of slave nodes with an analytic plane that may move along itself; as for surfaces."""
-    press = spring_function(friction, law)
-    open_contact = open_function(friction, law)
+    press = spring_function(friction, laws)
+    open_contact = open_function(friction, laws)
     gap_from_rest = rest_function(stress_free)
     of, Real, Vector, Index = value_function(each), kind(wp.float64, each), kind(wp.vec3d, each), kind(wp.int32, each)
 

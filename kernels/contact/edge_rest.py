@@ -12,6 +12,7 @@ import warp as wp
 
 from warp_mca.kernels.contact.edge_shares import slid_off
 from warp_mca.kernels.contact.edges import Surfaces, area_vector, lies_below, middle, neighbour
+from warp_mca.kernels.contact.laws import Laws
 from warp_mca.kernels.contact.nearest import ABOVE, Nearest, edge_of, nearest_face, reachable
 from warp_mca.kernels.contact.settle import Touch, meet, settle_functions
 from warp_mca.kernels.contact.side_choice import NodeSprings
@@ -184,12 +185,12 @@ def support_function(sides: int) -> Any:
 
 
 @cache
-def release_function(friction: bool, sides: int, law: str) -> Any:
+def release_function(friction: bool, sides: int, laws: Laws) -> Any:
     """The function that releases a node from a side that has no face below it, unless an edge of the slave rests there.
 
     It gives the force on the node [N]. `newcomer` is the spring that begins to press the node in this step, or -1.
     """
-    settle, let_go = settle_functions(friction, True, law)
+    settle, let_go = settle_functions(friction, True, laws)
     pressure, find_support = pressure_function(friction), support_function(sides)
     Gaps, Faces = wp.types.vector(sides, wp.float64), wp.types.vector(sides, wp.int32)
 

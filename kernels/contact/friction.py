@@ -1,4 +1,4 @@
-"""Owns the contact law along the surface: Coulomb stick-slip."""
+"""Owns the contact law along the surface: stick-slip up to a limit, Coulomb's or that of `friction_laws`."""
 
 import warp as wp
 
@@ -13,7 +13,7 @@ def stick_slip(
         f_old: tangential force on the slave so far [N].
         du: motion of the slave relative to the master since then [m].
         normal: unit normal of the master.
-        limit: mu F_n [N].
+        limit: of the force, mu F_n by Coulomb's law [N].
         k: stiffness of the spring [N/m].
 
     Returns:

@@ -1,18 +1,34 @@
 """Owns what the kernels ask of a contact law along the normal; `kernels.contact.penalty` is one.
 
 The kernels are made for elastic springs: the force is a function of the depth alone, and what the spring stores comes
-back as it is released. A law may add a dashpot, which dissipates (`kernels.contact.dashpot`). Friction keeps to
-Coulomb's law with the same stiffness k along the surface.
+back as it is released. A law may add a dashpot, which dissipates (`kernels.contact.dashpot`). Along the surface the
+spring has the same stiffness k up to the limit of friction, mu F_n unless laws of friction change it
+(`kernels.contact.friction_laws`).
 """
 
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
-from typing import Any
+from typing import Any, NamedTuple
 
 from warp_mca.base.errors import bad_value
 
 LINEAR = "warp_mca.kernels.contact.penalty"
+
+
+class Laws(NamedTuple):
+    """Modules of the laws for which a contact's kernels are made.
+
+    Attributes:
+        normal: of the force along the normal.
+        friction: of the laws of friction, in the order in which they change its limit; none for Coulomb's alone.
+    """
+
+    normal: str = LINEAR
+    friction: tuple[str, ...] = ()
+
+
+PLAIN = Laws()
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.contact.laws import Laws
 from warp_mca.kernels.contact.nearest import Master, Nearest, edge_of, master_velocity, passes_by, reachable
 from warp_mca.kernels.contact.projection import weights_at
 from warp_mca.kernels.contact.search import TOO_DEEP, TURNED
@@ -85,10 +86,10 @@ def meet_side(
 
 
 @cache
-def settle_functions(friction: bool, stress_free: bool, law: str) -> tuple[Any, Any]:
+def settle_functions(friction: bool, stress_free: bool, laws: Laws) -> tuple[Any, Any]:
     """The functions (settle: press a node on the face that it touches; let_go: release a node that found no face)."""
-    press = spring_function(friction, law)
-    open_contact = open_function(friction, law)
+    press = spring_function(friction, laws)
+    open_contact = open_function(friction, laws)
     gap_from_rest = rest_function(stress_free)
 
     @wp.func

@@ -12,7 +12,7 @@ import warp as wp
 from warp_mca.kernels.contact.contact import BLOCK_DIM
 from warp_mca.kernels.contact.edge_rest import release_function
 from warp_mca.kernels.contact.edges import Surfaces
-from warp_mca.kernels.contact.laws import LINEAR
+from warp_mca.kernels.contact.laws import PLAIN, Laws
 from warp_mca.kernels.contact.nearest import nearest_face
 from warp_mca.kernels.contact.search import STALE, moved_too_far
 from warp_mca.kernels.contact.settle import meet, settle_functions
@@ -29,7 +29,7 @@ from warp_mca.kernels.hardware.per_scene import kind, value_function
 
 
 @cache
-def sided_kernel(friction: bool, each: bool, sides: int, law: str = LINEAR) -> Any:
+def sided_kernel(friction: bool, each: bool, sides: int, laws: Laws = PLAIN) -> Any:
     """Kernel: as `kernels.contact.contact.surface_kernel`, for a master with several sides.
 
     Springs and lists are ordered by slave, then by side. A node that no side presses goes to the side behind which it
@@ -37,11 +37,11 @@ def sided_kernel(friction: bool, each: bool, sides: int, law: str = LINEAR) -> A
     the side that released it, because it may have slid over an edge. If several sides have candidates, step 0 chooses
     among them; step 1 presses the node.
     """
-    settle, _ = settle_functions(friction, True, law)
+    settle, _ = settle_functions(friction, True, laws)
     choose, confirm = choice_functions(sides)
     pressure, springs_of_node = pressure_function(friction), springs_function(friction, sides)
     front_faces, may_press = front_functions(sides)
-    release = release_function(friction, sides, law)
+    release = release_function(friction, sides, laws)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, launch_bounds=(BLOCK_DIM, 4))

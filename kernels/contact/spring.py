@@ -7,7 +7,8 @@ import warp as wp
 
 from warp_mca.kernels.contact.dashpot import dashpot_function
 from warp_mca.kernels.contact.friction import release, stick_slip
-from warp_mca.kernels.contact.laws import LINEAR, law_functions
+from warp_mca.kernels.contact.friction_laws import limit_function
+from warp_mca.kernels.contact.laws import LINEAR, PLAIN, Laws, law_functions
 
 FAR = 1e30  # larger than any distance [m]
 ANY_DEPTH = FAR  # depth before the first step: bodies may overlap from the start
@@ -32,7 +33,9 @@ class Spring:
     [m]. support, share: the slave's edge that the spring presses in place of its node, or -1, and the node's share of
     the force [-]; see `edge_rest`. bears: 1 where the side was the last to press the node itself, else 0 [-]. These
     four are only of masters with several sides. dashpot: force of the law's dashpot in the last step [N], and energy
-    that it dissipated so far [J]; only of laws that have one.
+    that it dissipated so far [J]; only of laws that have one. limit: of the friction force in the last step [N], and
+    friction_parameters: of the laws of friction [SI units], shape (law_count spring_count, parameter_count), those of
+    spring 0 first; only of contacts with such laws.
     """
 
     tangential: wp.array(dtype=wp.vec3d)
@@ -58,6 +61,8 @@ class Spring:
     share: wp.array(dtype=wp.float64)
     bears: wp.array(dtype=wp.int32)
     dashpot: wp.array(dtype=wp.vec2d)
+    limit: wp.array(dtype=wp.float64)
+    friction_parameters: wp.array2d(dtype=wp.float64)
 
 
 @wp.func
@@ -114,16 +119,16 @@ def rest_function(stress_free: bool) -> Any:
 
 
 @cache
-def spring_function(friction: bool, law: str) -> Any:
+def spring_function(friction: bool, laws: Laws) -> Any:
     """The function that turns a gap into force, normal force and bookkeeping; without `friction` none is tangential.
 
-    `law` names the module of the contact law. For a linear spring, energy and losses are computed from its force, not
-    from the energy W of the law.
+    For a linear spring, energy and losses are computed from its force, not from the energy W of the law.
     """
-    functions, linear = law_functions(law), law == LINEAR
+    functions, linear, by_laws = law_functions(laws.normal), laws.normal == LINEAR, len(laws.friction) > 0
     law_force, law_energy = functions.force, functions.energy
     damped = functions.dashpot is not None
-    damp = dashpot_function(law) if damped else None
+    damp = dashpot_function(laws.normal) if damped else None
+    friction_limit = limit_function(laws.friction) if by_laws else None
 
     @wp.func
     def soften(
@@ -210,7 +215,11 @@ def spring_function(friction: bool, law: str) -> Any:
             f_old = spring.tangential[s]
             if k < k_old:
                 f_old = soften(s, gap, normal, du, k_old, k, spring) * f_old
-            Ft, work, stick = stick_slip(f_old, du, normal, mu * Fn, k)
+            limit = mu * Fn
+            if wp.static(by_laws):
+                limit = friction_limit(mu, Fn, normal, du, dt, spring.friction_parameters, s)
+                spring.limit[s] = limit
+            Ft, work, stick = stick_slip(f_old, du, normal, limit, k)
             force += Ft
             squares += wp.dot(Ft, Ft)
             spring.tangential[s] = Ft
@@ -233,10 +242,10 @@ def spring_function(friction: bool, law: str) -> Any:
 
 
 @cache
-def open_function(friction: bool, law: str = LINEAR) -> Any:
+def open_function(friction: bool, laws: Laws = PLAIN) -> Any:
     """The function that clears the springs of a node that lost its contact."""
-    damped = law_functions(law).dashpot is not None
-    damp = dashpot_function(law) if damped else None
+    damped = law_functions(laws.normal).dashpot is not None
+    damp = dashpot_function(laws.normal) if damped else None
 
     @wp.func
     def open_contact(s: int, du: wp.vec3d, k: wp.float64, spring: Spring):

@@ -6,7 +6,7 @@ from warp_mca.kernels.contact.spring import Spring
 
 vec6 = wp.types.vector(6, wp.float32)  # xx, yy, zz, xy, yz, xz
 OPEN, SLIP, STICK = 0, 1, 2  # states of a contact point
-_STICKING = 0.999999  # share of mu F_n below which a point sticks
+_STICKING = 0.999999  # share of the limit of friction below which a point sticks
 
 
 @wp.func
@@ -113,7 +113,10 @@ def contact_points(
         if wp.dot(force, force) > wp.float64(0.0):
             tangential = spring.tangential[e]
             normal = force - tangential
-            if wp.length(tangential) < wp.float64(_STICKING) * mu * wp.length(normal):
+            most = wp.float64(_STICKING) * mu * wp.length(normal)
+            if spring.limit.shape[0] > 0:
+                most = wp.float64(_STICKING) * spring.limit[e]
+            if wp.length(tangential) < most:
                 state = int(wp.static(STICK))
             elif state == wp.static(OPEN):
                 state = int(wp.static(SLIP))

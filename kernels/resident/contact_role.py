@@ -9,6 +9,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.contact import LANES
+from warp_mca.kernels.contact.laws import Laws
 from warp_mca.kernels.contact.nearest import Master, Nearest, nearest_of
 from warp_mca.kernels.contact.search import STALE, moved_too_far
 from warp_mca.kernels.contact.settle import meet_side, settle_functions
@@ -85,9 +86,9 @@ def nearest_of_lanes(
 
 
 @cache
-def contact_role(friction: bool, stress_free: bool, law: str) -> Any:
+def contact_role(friction: bool, stress_free: bool, laws: Laws) -> Any:
     """The function that gives slave nodes their contact forces in each of the kernel's steps."""
-    settle, let_go = settle_functions(friction, stress_free, law)
+    settle, let_go = settle_functions(friction, stress_free, laws)
     pressure = pressure_function(friction)
 
     @wp.func

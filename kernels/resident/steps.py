@@ -10,6 +10,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.contact.laws import Laws
 from warp_mca.kernels.contact.nearest import Master
 from warp_mca.kernels.contact.spring import Spring
 from warp_mca.kernels.elements.patch import POINT, Patches
@@ -57,7 +58,7 @@ def resident_kernel(
     contact: bool,
     friction: bool,
     stress_free: bool,
-    contact_law: str,
+    contact_laws: Laws,
     partial: bool,
     coupled: bool,
 ) -> Any:
@@ -70,7 +71,7 @@ def resident_kernel(
     t = scalars(precision)
     R, vec3, point = t.real, t.vec3, POINT[precision]
     compute_patch, move_free = patch_role(maker, precision, law_name, turned), free_role(precision, contact, turned)
-    touch_slaves, move_masters = contact_role(friction, stress_free, contact_law), master_role(precision, turned)
+    touch_slaves, move_masters = contact_role(friction, stress_free, contact_laws), master_role(precision, turned)
     move_bound, move_pinned = bound_role(precision, partial, turned), pin_role(precision, turned)
 
     @wp.func

@@ -9,6 +9,7 @@ from warp_mca.scene.bodies import Body, Vec3
 from warp_mca.scene.contact_laws import Penalty
 from warp_mca.scene.contacts import OVERLAP_CHOICES, Contact, RigidPlane, Surface
 from warp_mca.scene.drives import Fixed, Prescribed
+from warp_mca.scene.friction_laws import DecayingFriction, ShearCap
 from warp_mca.scene.joints import Prismatic, Revolute, Spherical, Weld
 from warp_mca.scene.phases import BaseMotion, ImpactPhase, JointTorque, RigidPhase, Settle, Slide, Tip
 from warp_mca.scene.probes import Line, Path, Point
@@ -22,6 +23,7 @@ __all__ = [
     "BaseMotion",
     "Body",
     "Contact",
+    "DecayingFriction",
     "Fixed",
     "ImpactPhase",
     "JointTorque",
@@ -37,6 +39,7 @@ __all__ = [
     "RigidPlane",
     "Scene",
     "Section",
+    "ShearCap",
     "Spherical",
     "Settle",
     "Slide",

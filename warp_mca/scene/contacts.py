@@ -10,6 +10,7 @@ from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.scene.bodies import Vec3
 from warp_mca.scene.contact_laws import CONTACT_LAWS, ContactLaw, Penalty
+from warp_mca.scene.friction_laws import FRICTION_LAWS, FrictionLaw
 
 MOST_FRICTION = 1e6  # with which nothing slides [-]
 OVERLAP_CHOICES = ("refuse", "stress_free", "press")
@@ -58,11 +59,13 @@ class Contact:
     Attributes:
         slave: surface whose nodes are kept out of the master.
         master: surface of another body, or a rigid plane.
-        mu: coefficient of friction [-]; 0 runs no friction at all.
+        mu: coefficient of friction [-], the one at rest where `friction` has laws; 0 runs no friction at all.
         penalty: factor f of the penalty stiffness k = f K A^2 / V [-]. None takes k = c E / (1 - nu^2) A^2 / V, with
             c = 3.8 where a surface is curved and 0.76 where both are flat: at nu = 0.3 that is f = 5 and f = 1. "auto"
             chooses f from mesh, curvature, mass and speed, so that springs hold at most some 7 % of the energy.
         law: force along the normal over depth and stiffness; the linear spring k g by default.
+        friction: law that changes the limit mu F_n of the friction force, or several that do in turn, as
+            (DecayingFriction(kinetic=0.2, decay=2.0), ShearCap(tau_max=1e8)); Coulomb's limit by default.
         two_way: the master's nodes are also kept out of the slave's faces.
         initial_overlap: what to do where bodies overlap before the first step: "refuse" the scene; start "stress_free",
             with springs that count depth from there; or "press", with the springs' full force.
@@ -85,6 +88,7 @@ class Contact:
     normal: Vec3 | None = None
     tangent: Vec3 | None = None
     law: ContactLaw = field(default_factory=Penalty)
+    friction: FrictionLaw | tuple[FrictionLaw, ...] = ()
 
     def __post_init__(self) -> None:
         validate.plain(self)
@@ -103,6 +107,7 @@ class Contact:
         if not (validate.is_number(self.mu) and 0.0 <= self.mu <= MOST_FRICTION):
             remedy = f"give a coefficient of friction from 0 to {MOST_FRICTION:g}"
             raise bad_value("Contact.mu", self.mu, remedy)
+        self._check_friction()
         validate.flags("Contact", two_way=self.two_way)
         if self.two_way and isinstance(self.master, RigidPlane):
             raise bad_value("Contact.two_way", self.two_way, "a rigid plane has no nodes; leave two_way off")
@@ -112,3 +117,17 @@ class Contact:
             validate.texts("Contact", name=self.name)
         axes = {"normal": self.normal, "tangent": self.tangent}
         validate.directions("Contact", **{name: axis for name, axis in axes.items() if axis is not None})
+
+    @property
+    def friction_laws(self) -> tuple[FrictionLaw, ...]:
+        """The laws of `friction`, also where it is a single one."""
+        return self.friction if isinstance(self.friction, tuple) else (self.friction,)
+
+    def _check_friction(self) -> None:
+        for law in self.friction_laws:
+            if type(law) not in FRICTION_LAWS.values():  # others are not registered
+                remedy = f"give a {' or a '.join(FRICTION_LAWS)}; register other classes by warp_mca.register"
+                raise bad_value("Contact.friction", validate.brief(law), remedy)
+            if self.mu == 0.0:
+                raise bad_value("Contact.mu", self.mu, "give the coefficient at rest, above 0, for the law of friction")
+            law.check(self.mu)

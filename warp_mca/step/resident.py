@@ -12,7 +12,7 @@ import numpy as np
 import warp as wp
 
 from warp_mca.kernels.contact.contact import LANES
-from warp_mca.kernels.contact.laws import LINEAR
+from warp_mca.kernels.contact.laws import PLAIN
 from warp_mca.kernels.contact.nearest import Master
 from warp_mca.kernels.contact.spring import Spring
 from warp_mca.kernels.elements.patch_layout import PATCH
@@ -119,7 +119,7 @@ class Resident:
             contact is not None,
             friction,
             stress_free,
-            contact.law if contact else LINEAR,
+            contact.laws if contact else PLAIN,
             solver.constraints.partial and not solver.couplings.count,
             solver.couplings.count > 0,
         )

@@ -161,7 +161,7 @@ def check_alike(scenes: Sequence[Scene], duration: float | None = None) -> float
             remedy = f"scenes[0] has {len(first.contacts)}; batch scenes with as many contacts"
             raise bad_value(f"number of scenes[{k}].contacts", len(scene.contacts), remedy)
         for i, (contact, wanted) in enumerate(zip(scene.contacts, first.contacts, strict=True)):
-            for name, kind in (("master", _kind), ("two_way", bool), ("law", _law)):
+            for name, kind in (("master", _kind), ("two_way", bool), ("law", _law), ("friction_laws", _laws)):
                 value, other = (kind(getattr(item, name)) for item in (contact, wanted))
                 if value != other:
                     remedy = f"that of scenes[0] is {other}; batch scenes with contacts of the same kinds"
@@ -175,6 +175,10 @@ def _kind(master: object) -> str:
 
 def _law(law: object) -> str:
     return type(law).__name__
+
+
+def _laws(laws: Sequence[object]) -> str:
+    return ", ".join(map(_law, laws)) or "mu alone"
 
 
 @contextmanager

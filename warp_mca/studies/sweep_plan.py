@@ -184,7 +184,8 @@ def _elastic(body: Body) -> object:
 
 
 def _contact_key(contact: Contact) -> object:
-    return isinstance(contact.master, RigidPlane), contact.two_way, type(contact.law).__name__, contact.penalty
+    laws = [type(law).__name__ for law in (contact.law, *contact.friction_laws)]
+    return isinstance(contact.master, RigidPlane), contact.two_way, laws, contact.penalty
 
 
 def _keys(mappings: Iterable[Mapping[str, object]]) -> list[str]:

@@ -30,6 +30,7 @@ FILES = (
     "taylor",
     "rates",
     "friction",
+    "friction_laws",
     "rolling",
     "rigid",
     "hinges",

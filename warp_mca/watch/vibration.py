@@ -106,7 +106,7 @@ def creep(c: Finished, times: float) -> Iterator[Values]:
         own = [k for k, item in enumerate(model.passes) if item.contact == contact]
         normal = model.contact_axes[contact, 0]
         mu = max((model.passes[k].mu for k in own), default=0.0)
-        if mu == 0.0 or not normal.any():
+        if mu == 0.0 or c.scene.contacts[contact].friction_laws or not normal.any():  # no record has a law's limit
             continue
         sign = np.array([model.passes[k].sign for k in own])
         speed, share = _creep(ledger.springs(rows)[:, own], sign, normal, mu, ledger.contact_dt)

@@ -27,9 +27,10 @@ def new_springs(stage: ContactStage) -> Any:
         setattr(found, name, wp.zeros(count, dtype=wp.vec3d))
     for name in numbers.split():
         setattr(found, name, wp.zeros(count, dtype=wp.float64))
-    found.normal_energy = wp.zeros(0 if stage.law == LINEAR else count, dtype=wp.float64)
-    found.dashpot = wp.zeros(0 if law_functions(stage.law).dashpot is None else count, dtype=wp.vec2d)
-    found.parameters = stage.parameters
+    found.normal_energy = wp.zeros(0 if stage.laws.normal == LINEAR else count, dtype=wp.float64)
+    found.dashpot = wp.zeros(0 if law_functions(stage.laws.normal).dashpot is None else count, dtype=wp.vec2d)
+    found.parameters, found.friction_parameters = stage.parameters, stage.friction_parameters
+    found.limit = wp.zeros(count if stage.laws.friction else 0, dtype=wp.float64)
     found.rest = wp.zeros(count if stage.stress_free else sided, dtype=wp.float64)
     found.left = wp.zeros(sided, dtype=wp.float64)
     found.share = wp.full(sided, 1.0, dtype=wp.float64)

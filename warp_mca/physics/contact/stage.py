@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 
 from warp_mca.base.joining import offsets
 from warp_mca.kernels.contact import contact, edges, nearest, search, sides
+from warp_mca.kernels.contact.laws import Laws
 from warp_mca.kernels.records.columns import PASS, PASS_COLUMNS
 from warp_mca.physics.contact.dashpots import check_dashpots
+from warp_mca.physics.contact.friction_laws import friction_rows
 from warp_mca.physics.contact.slave_edges import SlaveEdges, new_springs
 from warp_mca.physics.contact.surfaces import LIST_LENGTH, ContactPass
 from warp_mca.step.threads import CONTACT, Split, whole
@@ -96,19 +98,20 @@ class ContactStage:
         self.stiffness = wp.array(self._join("stiffness"), dtype=wp.float64)
         self.mu = _numbers([item.mu for item in items])
         self.stress_free = any(item.initial_overlap == "stress_free" for item in items)
-        self.law = items[0].law
+        self.laws = Laws(items[0].law, items[0].friction)
         check_dashpots(items)
         rows = np.repeat([item.parameters for item in items], np.diff(self.springs), axis=0)
         self.parameters = wp.array(rows, dtype=wp.float64, ndim=2)
+        self.friction_parameters = wp.array(friction_rows(items, self.sides), dtype=wp.float64, ndim=2)
         friction = any(item.mu > 0.0 for item in items)
         if items[0].plane is not None:
-            self.kernel = contact.plane_kernel(friction, self.each, self.stress_free, self.law)
+            self.kernel = contact.plane_kernel(friction, self.each, self.stress_free, self.laws)
             self._make_planes()
             return
         self.kernel = (
-            contact.surface_kernel(friction, self.each, self.stress_free, self.law, self.noted)
+            contact.surface_kernel(friction, self.each, self.stress_free, self.laws, self.noted)
             if self.sides == 1
-            else sides.sided_kernel(friction, self.each, self.sides, self.law)
+            else sides.sided_kernel(friction, self.each, self.sides, self.laws)
         )
         self.lanes = contact.LANES if wp.get_device().is_cuda else 1
         self.react, self.bounds = (

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.geometry.cell_types import is_triangle
+from warp_mca.physics.contact.friction_laws import friction_values
 from warp_mca.physics.contact.sides import find_sides, is_curved, stiffest_fold
 from warp_mca.scene import Contact, RigidPlane
 from warp_mca.scene.contact_laws import law_values
@@ -64,6 +65,8 @@ class ContactPass:
         stiffness: greatest penalty stiffness of each, that of its own faces [N/m], shape (slave_count,), float64.
         mu: coefficient of friction [-].
         law, parameters: module of the contact law, and what its functions read.
+        friction: modules of the laws of friction.
+        friction_parameters: what their functions read, shape (slave_count, law_count, parameter_count), float64.
         stiffening: greatest slope of the law down to the penetration that stops the run, over the stiffness [-].
         damping: greatest slope of its dashpot over the rate, over the stiffness [s]; 0 without a dashpot.
         decay: greatest of what dashpots add to the diagonal of M^-1 C, by the bound of `contact_eigenvalues` [1/s].
@@ -94,6 +97,8 @@ class ContactPass:
     law: str = field(metadata=AS_IS)
     parameters: tuple[float, ...] = field(metadata=AS_IS)
     stiffening: float = field(metadata=AS_IS)
+    friction: tuple[str, ...] = field(default=(), metadata=AS_IS)
+    friction_parameters: Array = field(default_factory=lambda: np.zeros((0, 0, 0)), metadata=AS_IS)
     damping: float = field(default=0.0, metadata=AS_IS)
     decay: float = field(default=0.0, metadata=AS_IS)
     plane: RigidPlane | None = field(default=None, metadata=AS_IS)
@@ -211,6 +216,7 @@ def _surface_pass(
         face_stiffness=factor * other,
         mu=contact.mu,
         **law_values(contact.law, 0.5 * longest),
+        **friction_values(contact, slave),
         slave_face=slave.node,
         slave_offset=slave_offset,
         face_of_slave=around_slave,
@@ -252,6 +258,7 @@ def contact_passes(contact: Contact, index: int, slave: Faces, master: Faces | N
                 slave_face=slave.node,
                 mu=contact.mu,
                 **law_values(contact.law, deepest),
+                **friction_values(contact, slave),
                 sign=1.0,
                 contact=index,
                 plane=contact.master,
