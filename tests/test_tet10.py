@@ -18,6 +18,7 @@ from test_own_ten_nodes import striking
 
 import warp_mca as mca
 from warp_mca.geometry import tetra10
+from warp_mca.geometry.cell_types import GMSH_ORDER
 from warp_mca.geometry.degenerate import tetrahedral
 from warp_mca.geometry.quadratic import straightened
 from warp_mca.geometry.quality import check, gauss_jacobians, volumes
@@ -262,6 +263,27 @@ def test_edges_of_a_file_that_spoil_their_cell_are_straightened(tmp_path: Path):
     assert any("6 edges bend so far that they spoil their cell" in note for note in mesh.notes)
     (cell,) = mesh.others["tetra10"]
     np.testing.assert_allclose(mesh.points[cell[4]], [0.5, 0.0, 0.0], atol=1e-12)
+
+
+def test_cells_whose_edges_bend_inside_out_stay_as_their_corners_are(tmp_path: Path):
+    """Edges of the base that lie beyond the top make the volume of a cell negative, but not that of its corners."""
+    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    points = np.concatenate([corners, corners[tetra10.EDGES].mean(axis=1)])
+    points[4:7, 2] = 2.0
+    assert tetra10.volumes(points[None])[0] < 0.0
+    meshio.write(tmp_path / "out.vtu", meshio.Mesh(points, [("tetra10", np.arange(10)[None])]))
+    found = mca.MeshFile(tmp_path / "out.vtu").build()
+    check(found, "out")
+    assert volumes(found).sum() == pytest.approx(1.0 / 6.0)
+
+
+def test_nodes_within_edges_in_another_order_are_refused(tmp_path: Path):
+    """A node lies within two edges then, which could not both be made straight."""
+    mesh = cut(mca.Box(size=(1.0, 1.0, 1.0), divisions=(1, 1, 1)).build(), "tet10")
+    cells = mesh.others["tetra10"][:, GMSH_ORDER]
+    meshio.write(tmp_path / "gmsh.vtu", meshio.Mesh(mesh.points, [("tetra10", cells)]))
+    with pytest.raises(mca.RequestError, match="within several edges of ten-node tetrahedra; write their nodes in the"):
+        mca.MeshFile(tmp_path / "gmsh.vtu").build()
 
 
 # Parts of CAD files.

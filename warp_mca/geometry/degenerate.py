@@ -33,7 +33,7 @@ def stored(points: NDArray[np.float64], cells: Cells, name: str) -> Cells:
     corners = list(cell.stored_corners)
     upright = cells.copy()
     if cell is not HEXAHEDRON:
-        integrals, count = integrals_of(cell.stored_as)
+        integrals, count = integrals_of(cell.linear or cell.stored_as)
         negative = integrals.volumes(points[cells[:, corners[:count]]]) < 0.0
         upright[negative] = cells[negative][:, list(cell.mirrored)]
     return upright[:, corners].astype(np.int32)

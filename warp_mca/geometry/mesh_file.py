@@ -105,7 +105,10 @@ class MeshFile:
         if len(quadratic):
             arrays["others"] = {TETRA10.name: quadratic}
             node_sets = with_middles_of_faces(quadratic, node_sets, len(points))
-            bent, points = points, straightened(points, quadratic)
+            try:
+                bent, points = points, straightened(points, quadratic)
+            except ValueError as error:
+                raise self._bad(f"{error}; write their nodes in the order of the format") from error
             if moved := int((bent != points).any(axis=1).sum()):
                 notes.append(
                     f"{self.path}: {moved} edges bend so far that they spoil their cell, and are taken as straight"

@@ -58,7 +58,16 @@ def straightened(points: Array, cells: Index, least: float = LEAST) -> Array:
         points: [m], shape (node_count, 3), float64.
         cells: nodes of the ten-node tetrahedra, shape (cell_count, 10), int32.
         least: determinant over its mean in the cell from which on edges stay as they are [-].
+
+    Raises:
+        ValueError: a node lies within two edges, as where a file has the nodes in another order.
     """
+    middle, edge = cells[:, TETRAHEDRON.corners :], edges_of(cells[:, : TETRAHEDRON.corners])[1]
+    node, times = np.unique(
+        np.unique(np.stack([middle, edge], axis=2).reshape(-1, 2), axis=0)[:, 0], return_counts=True
+    )
+    if (times > 1).any():
+        raise ValueError(f"node {node[times > 1][0]}, counted from 0, lies within several edges of ten-node tetrahedra")
     points = points.copy()
     left = np.arange(len(cells))
     middles = 0.5 * (points[cells[:, EDGES[:, 0]]] + points[cells[:, EDGES[:, 1]]])
