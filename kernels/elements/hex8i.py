@@ -9,7 +9,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.elements import hex8i_points
+from warp_mca.kernels.elements import hex8i_points, hex8i_vectors
 from warp_mca.kernels.elements.formulation import OWN, Formulation
 from warp_mca.kernels.elements.hex8i_small import elastic_function, plastic_tractions_function, stress_function
 from warp_mca.kernels.elements.hexahedron import load_function, store_function
@@ -113,7 +113,7 @@ def formulation(points: int, precision: str, law_name: str, finite: bool) -> For
     frame, solve = modes.frame, modes.solve
     column_place, layer_place, layer_count = *place_functions(precision, points), points // 4
     by_points, plastic = keeps_vectors(law_functions(law_name, precision), finite), bool(law_name)
-    read_vectors, _ = hex8i_points.vector_functions(precision, law_name, points)
+    read_vectors, _ = hex8i_vectors.vector_functions(precision, law_name, points)
     plastic_tractions = plastic_tractions_function(precision, law_name, points)
 
     @wp.struct
@@ -204,6 +204,6 @@ def kernels(points: int) -> SimpleNamespace:
         force_kernel=partial(force_kernel, points),
         energy_kernel=partial(energy_kernel, maker),
         stress_kernel=partial(stress_kernel, maker),
-        kept=lambda law, finite: hex8i_points.KEPT if keeps_vectors(law, finite) else (),
+        kept=lambda law, finite: hex8i_vectors.KEPT if keeps_vectors(law, finite) else (),
         lags=lags,
     )

@@ -8,13 +8,12 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.elements.fused import fused
 from warp_mca.kernels.elements.hex8_lanes import HISTORY_SIZE
-from warp_mca.kernels.elements.hex8i_exchange import lane_functions
+from warp_mca.kernels.elements.hex8i_exchange import corner_functions, lane_functions
 from warp_mca.kernels.elements.hex8i_small import conjugate_function, settled_function, stress_modes_function
 from warp_mca.kernels.elements.internal_modes import PLANE, mode_functions, place_functions
 from warp_mca.kernels.elements.patch import POINT, Patches
-from warp_mca.kernels.elements.patch_element import load_functions, material_of
+from warp_mca.kernels.elements.patch_element import material_of
 from warp_mca.kernels.elements.patterns import VOLUME_SCALE, mean_functions
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.hardware.shared_memory import ROW, row_functions, warp_barrier
@@ -160,39 +159,20 @@ def sums_function(precision: str) -> Any:
 
 
 @cache
-def corners_function(precision: str) -> Any:
-    """The function that gives the forces of a lower and an upper corner: their half sum, and half difference.
-
-    (Gradients b, W = Q - I, mean stress P less what the amplitudes do in it, times VOLUME_SCALE, hourglass forces Q,
-    xi and eta of the corners) -> (base, top), of which the upper corner has -base - top, the lower one top - base.
-    """
-    t = scalars(precision)
-    R, mat33, mat43, mat63 = t.real, t.mat33, t.mat43, t.mat63
-    add_product = fused(precision).add_product
-
-    @wp.func
-    def corner_forces(b: mat63, W: mat33, P: mat33, Q: mat43, xi: R, eta: R):
-        # patterns of the forces, as the signs of the corners add them
-        both = xi * eta
-        base = add_product(both * Q[2], P, xi * b[0] + eta * b[1] + both * b[5])
-        top = add_product(eta * Q[0] + xi * Q[1] + both * Q[3], P, b[2] + eta * b[3] + xi * b[4])
-        return add_product(base, W, base), add_product(top, W, top)
-
-    return corner_forces
-
-
-@cache
 def flow_function(points: int, precision: str, law_name: str) -> Any:
     """The function by which two lanes compute an element of a patch."""
     R, point = scalars(precision).real, POINT[precision]
-    _, _, load_corners = load_functions(precision)
-    patterns, _, vector_sum, lane_max = lane_functions(precision)
+    _, _, vector_sum, lane_max = lane_functions(precision)
     column_place, _ = place_functions(precision, points)
     plastic_parts, flow_column = column_functions(points, precision, law_name)
     modes = mode_functions(precision)
     frame, whole = modes.frame, modes.whole
     stress_modes, conjugate = stress_modes_function(precision), conjugate_function(precision)
-    lane_sums, corner_forces, kept = sums_function(precision), corners_function(precision), kept_function(precision)
+    lane_sums, kept, (load_patterns, store_forces) = (
+        sums_function(precision),
+        kept_function(precision),
+        corner_functions(precision),
+    )
     mean_gradients, _ = mean_functions(precision)
     size = points // 4 * HISTORY_SIZE
     read_row, write_row = row_functions(precision, size)
@@ -217,20 +197,14 @@ def flow_function(points: int, precision: str, law_name: str) -> Any:
         """Two lanes, 0 and 1, compute the element of a thread. Returns whether a lane's points flow."""
         near_history = read_row(history_out, wp.static(size) * lane, e)  # first, because it takes longest
         far_history = read_row(history_out, wp.static(size) * (lane + 2), e)
-        a = lane  # corners run around the faces
-        c = 3 - lane
-        x0, _d0, x1, _d1 = load_corners(points, pool, patches, e, a, first, exponent)
-        x2, _d2, x3, _d3 = load_corners(points, pool, patches, e, c, first, exponent)
         m = material_of(patches.corner[0, e], patches.corner[1, e])
         H, q, W = kept(thread, force_out)
         warp_barrier()
         right = wp.where(lane != 0, R(1.0), R(-1.0))
-        far = R(1.0)
         xi, eta = column_place(lane + 2)
-        x = patterns(x0, x1, x2, x3, right)
+        x = load_patterns(points, pool, patches, e, lane, first, exponent, right)
         y = frame(x)
-        K = law[m, 0]
-        G = law[m, 1]
+        K, G = law[m, 0], law[m, 1]
         n0, n1, n2 = plastic_parts(near_history, far_history, y, xi, eta)
         S, S0, S1, S2, N0, N1, N2, pressure, p = stress_modes(
             x, H, q, y, vector_sum(n0), vector_sum(n1), vector_sum(n2), K, G
@@ -247,31 +221,19 @@ def flow_function(points: int, precision: str, law_name: str) -> Any:
         largest = lane_max(wp.max(near_largest, far_largest))
         if valid and lane == 0:
             keep_strain(e, strain_square(largest, G), extreme_out)
-        near_flows = near_flows and valid
-        far_flows = far_flows and valid
-        if near_flows:
+        if valid and near_flows:
             write_row(near_history, wp.static(size) * lane, e, history_out)
-        if far_flows:
+        if valid and far_flows:
             write_row(far_history, wp.static(size) * (lane + 2), e, history_out)
-        flows = near_flows or far_flows
+        flows = valid and (near_flows or far_flows)
         mean, R0, R1, R2, p, w, lost = lane_sums(near, near_moment, beyond, far_moment, p, y, right, K, G)
         b, scaled_volume = mean_gradients(x)
         volume = R(VOLUME_SCALE) * scaled_volume
         if lane_max(wp.where(flows, R(1.0), R(0.0))) > R(0.0) and lane == 0:
             wp.atomic_add(extreme_out, LAG_LOSS, e, volume * lost)  # which waits for nothing
         Q = conjugate(x, volume, y, R0, R1, R2, p, w)
-        P = whole(mean, pressure)
-        for n in range(4):  # amplitudes depend on the mean gradient, too
-            P = P - wp.outer((R(1.0) / volume) * Q[n], x[3 + n])
-        P = R(VOLUME_SCALE) * P
-        base, top = corner_forces(b, W, P, Q, right, -far)
-        beyond_base, beyond_top = corner_forces(b, W, P, Q, right, far)
         if valid:
-            for i in range(3):
-                force_out[(3 * a + i) * wp.static(ROW) + thread] = top[i] - base[i]
-                force_out[(3 * (a + 4) + i) * wp.static(ROW) + thread] = -base[i] - top[i]
-                force_out[(3 * c + i) * wp.static(ROW) + thread] = beyond_top[i] - beyond_base[i]
-                force_out[(3 * (c + 4) + i) * wp.static(ROW) + thread] = -beyond_base[i] - beyond_top[i]
+            store_forces(x, b, volume, W, whole(mean, pressure), Q, right, lane, thread, force_out)
         return flows
 
     return flow

@@ -10,9 +10,6 @@ displacement gradient, in place of a_k n_k, which is the same at small strain: i
 soften hourglass modes below those of an element without internal vectors (Wriggers and Reese, Comput. Meth. Appl. Mech.
 Engng 135 (1996) 201; Glaser and Armero, Engng Comput. 14 (1997) 759). All parts turn with F, so that the energy is
 objective, and angular momentum is kept.
-Logarithmic elasticity is elliptic up to stretches of about 0.21 to 1.39 only (Bruhns, Xiao and Meyers, Proc. R. Soc. A
-457 (2001) 2207), beyond which a vector would grow at will: vectors fade out before, as elastic strains grow. Plastic
-strains do not count.
 """
 
 from functools import cache
@@ -21,40 +18,13 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.elements.hex8i_small import internal_function
-from warp_mca.kernels.elements.internal_modes import LEAST, mode_functions, place_functions
-from warp_mca.kernels.hardware.scalars import THIRD, scalars
+from warp_mca.kernels.elements.hex8i_vectors import closed_form_function, corrected_function, vector_functions
+from warp_mca.kernels.elements.internal_modes import mode_functions, place_functions
+from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.materials.kinematics import kinematics
-from warp_mca.kernels.materials.laws import law_functions
 from warp_mca.kernels.materials.point import material_point
 
 wp.set_module_options({"enable_backward": False})
-
-FADING, FADED = 0.2, 0.35  # |e| of the elastic deviatoric strain e from which vectors fade, and at which they are gone
-
-KEPT = ("vector", "vector", "vector", "scalar")  # c_k, and how far vectors have faded, behind the history of the points
-
-
-@cache
-def vector_functions(precision: str, law_name: str, points: int) -> tuple[Any, Any]:
-    """Functions that read and write c_k, one in each row, and the share [-] that is left of vectors."""
-    t = scalars(precision)
-    R, mat33 = t.real, t.mat33
-    first = points * law_functions(law_name, precision).size
-
-    @wp.func
-    def read_vectors(history: wp.array2d(dtype=R), e: int):
-        c = mat33()
-        for i in range(9):
-            c[i // 3, i % 3] = history[wp.static(first) + i, e]
-        return c, R(1.0) - history[wp.static(first + 9), e]
-
-    @wp.func
-    def write_vectors(history_out: wp.array2d(dtype=R), e: int, c: mat33, share: R):
-        for i in range(9):
-            history_out[wp.static(first) + i, e] = c[i // 3, i % 3]
-        history_out[wp.static(first + 9), e] = R(1.0) - share
-
-    return read_vectors, write_vectors
 
 
 @cache
@@ -180,35 +150,6 @@ def sums_function(precision: str, law_name: str, finite: bool, points: int) -> A
 
 
 @cache
-def closed_form_function(precision: str) -> Any:
-    """The function (s, r, G_k, Y, y, F^-1, K, G) -> how r . F^T L(G_k F^-1) changes with G_k and with F, negative.
-
-    s is A_k^-1 F r, Y is F y. What r has left of traction does work as the closed form of a vector changes.
-    """
-    t = scalars(precision)
-    R, vec3, mat33 = t.real, t.vec3, t.mat33
-    modes, internal_vector = mode_functions(precision), internal_function(precision)
-    doubled_gradient, twice, whole = modes.doubled_gradient, modes.twice, modes.whole
-    tensor = wp.types.vector(6, R)
-
-    @wp.func
-    def elastic(D: tensor, K: R, G: R):
-        return whole(G * D, (R(0.5) * K - R(THIRD) * G) * (D[0] + D[1] + D[2]))
-
-    @wp.func
-    def closed_form(s: vec3, r: vec3, G_k: mat33, Y: vec3, y: vec3, inverse: mat33, K: R, G: R):
-        with_G = elastic(twice(s, Y), K, G) * wp.transpose(inverse)
-        spatial = G_k * inverse
-        D = doubled_gradient(spatial)
-        b = internal_vector(D, Y, vec3(), K, G)
-        v = (K + R(THIRD) * G) * (wp.dot(Y, b) * s + wp.dot(s, Y) * b) + (R(2.0) * G * wp.dot(s, b)) * Y
-        with_F = wp.outer(elastic(D, K, G) * s + v, y) - wp.outer(b, r) - wp.transpose(spatial) * with_G
-        return with_G, with_F
-
-    return closed_form
-
-
-@cache
 def stress_function(precision: str, law_name: str, finite: bool, points: int) -> Any:
     """The function that gives mean nominal stress P, hourglass forces Q and greatest e : e of an element.
 
@@ -218,18 +159,9 @@ def stress_function(precision: str, law_name: str, finite: bool, points: int) ->
     R, vec3, mat33, mat43, mat73 = t.real, t.vec3, t.mat33, t.mat43, t.mat73
     modes, varying = mode_functions(precision), varying_function(precision, finite)
     gradients, solve, normal = modes.gradients, modes.solve, modes.normal
-    closed_form = closed_form_function(precision)
+    closed_form, corrected = closed_form_function(precision), corrected_function(precision, law_name, finite)
     read_vectors, write_vectors = vector_functions(precision, law_name, points)
     point_sums, plastic = sums_function(precision, law_name, finite, points), bool(law_name)
-    fades = finite and not law_functions(law_name, precision).general
-
-    @wp.func
-    def kept_share(stress2: R, G: R):
-        kept = R(1.0)
-        if wp.static(fades):
-            kept = (R(FADED) - R(0.5) * wp.sqrt(stress2) / G) * R(wp.static(1.0 / (FADED - FADING)))
-            kept = wp.clamp(kept, R(0.0), R(1.0))
-        return kept
 
     @wp.func
     def conjugate(R0: mat33, R1: mat33, R2: mat33, y: mat33, last: vec3):
@@ -273,14 +205,9 @@ def stress_function(precision: str, law_name: str, finite: bool, points: int) ->
         s0 = solve(F * r0, Y[0], K, G)
         s1 = solve(F * r1, Y[1], K, G)
         s2 = solve(F * r2, Y[2], K, G)
-        three = R(3.0) * wp.transpose(F)
-        kept = kept_share(stress2, G)
-        new = mat33()
-        new[0] = kept * (c[0] - three * s0)
-        new[1] = kept * (c[1] - three * s1)
-        new[2] = kept * (c[2] - three * s2)
-        write_vectors(history_out, e, new, kept)
-        change = (new - c) + (kept / wp.max(share, R(LEAST)) - R(1.0)) * (a - c)
+        S = wp.matrix_from_rows(s0, s1, s2)
+        change, c, kept = corrected(F, c, a, S, share, stress2, G)
+        write_vectors(history_out, e, c, kept)
         lost = -volume * (wp.dot(r0, change[0]) + wp.dot(r1, change[1]) + wp.dot(r2, change[2]))
         D0 = normal(y[0])
         D1 = normal(y[1])

@@ -54,6 +54,7 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
     """Kernel: elastic, plastic and hourglass energy [J], greatest strain and smallest Jacobian ratio [-] so far.
 
     The points' own Jacobians are those of this step; of the steps between, the force kernels keep that of the centre.
+    An inverted element's Q is a reflection, which would hide the inversion in its own frame.
     """
     form, point, place = parts_of(maker, precision, law_name, finite)
     load = load_function(maker, precision, law_name, finite)
@@ -83,8 +84,7 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
     ):
         e = wp.tid()
         m = material[e]
-        K = law[m, 0]
-        G = law[m, 1]
+        K, G = law[m, 0], law[m, 1]
         flag = int(0)
         if wp.static(plastic):
             flag = yielded[e]
@@ -118,16 +118,15 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
             elastic += volume * volumetric_energy(K, growth / volume)
         energy_out[0, first + e] = elastic
         energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * largest)
-        # an inverted element's Q is a reflection, which would hide the inversion in its own frame
-        smallest = smallest * wp.determinant(identity + rotation(shape))
-        energy_out[3, first + e] = wp.min(smallest, R(1.0) - extreme[VOLUME_LOSS, e])
+        smallest = wp.min(smallest * wp.determinant(identity + rotation(shape)), R(1.0) - extreme[VOLUME_LOSS, e])
         hourglass = R(0.0)
+        if wp.static(lags):
+            hourglass = extreme[LAG_LOSS, e]
         if wp.static(has_modes):
             hourglass, spent = modes(shape, K, G, flag, history, e)
             dissipated += spent
-        if wp.static(lags):
-            hourglass = extreme[LAG_LOSS, e]
         energy_out[1, first + e] = dissipated
+        energy_out[3, first + e] = smallest
         energy_out[4, first + e] = hourglass
 
     return element_energy
