@@ -311,7 +311,8 @@ def _(beyond: bool) -> list[str]:
     own = ledger({"count": count}, table=lambda first: springs, springs=lambda rows: rows, contact_dt=dt, steps=steps)
     way = under(vibration.creep, beyond) * 1e-3 * interval * (count - 1)
     u = np.tile([way, 0.0, 0.0], (3, 1))
-    return told(vibration.creep, ledger=own, model=model, contacts=[history([1.0])], u=u)
+    scene = SimpleNamespace(contacts=[SimpleNamespace(friction_laws=())])
+    return told(vibration.creep, ledger=own, model=model, scene=scene, contacts=[history([1.0])], u=u)
 
 
 # before the run

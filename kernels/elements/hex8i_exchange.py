@@ -134,7 +134,7 @@ def corner_functions(precision: str) -> tuple[Any, Any]:
             force_out[(3 * (a + 4) + i) * wp.static(ROW) + lane] = -base[i] - top[i]
 
     @wp.func
-    def store_forces(
+    def store_lane_forces(
         x: mat73,
         b: mat63,
         volume: R,
@@ -152,4 +152,4 @@ def corner_functions(precision: str) -> tuple[Any, Any]:
         store_pair(b, W, P, Q, xi, R(-1.0), lane, thread, force_out)
         store_pair(b, W, P, Q, xi, R(1.0), 3 - lane, thread, force_out)
 
-    return load_patterns, store_forces
+    return load_patterns, store_lane_forces

@@ -168,7 +168,7 @@ def flow_function(points: int, precision: str, law_name: str) -> Any:
     modes = mode_functions(precision)
     frame, whole = modes.frame, modes.whole
     stress_modes, conjugate = stress_modes_function(precision), conjugate_function(precision)
-    lane_sums, kept, (load_patterns, store_forces) = (
+    lane_sums, kept, (load_patterns, store_lane_forces) = (
         sums_function(precision),
         kept_function(precision),
         corner_functions(precision),
@@ -233,7 +233,7 @@ def flow_function(points: int, precision: str, law_name: str) -> Any:
             wp.atomic_add(extreme_out, LAG_LOSS, e, volume * lost)  # which waits for nothing
         Q = conjugate(x, volume, y, R0, R1, R2, p, w)
         if valid:
-            store_forces(x, b, volume, W, whole(mean, pressure), Q, right, lane, thread, force_out)
+            store_lane_forces(x, b, volume, W, whole(mean, pressure), Q, right, lane, thread, force_out)
         return flows
 
     return flow
