@@ -49,7 +49,7 @@ def test_a_run_says_before_it_starts_what_sets_its_step(caplog: pytest.LogCaptur
     order: list[str] = []
     mca.run(bar(penalty=10.0), threads=1, progress=lambda stage, _: order.append(f"{stage} {len(caplog.records)}"))
     (said,) = [record.message for record in caplog.records if record.levelno == logging.INFO]
-    what = r"bar: 100 elements, 1,560 steps of [\d.e-]+ s, set by element 99 of bar"
+    what = r"bar: 100 elements, 1,440 steps of [\d.e-]+ s, set by element 99 of bar"
     assert re.fullmatch(rf"{what} \(\d+% of omega\^2 by contact springs\); about [\d.]+ s on cpu, 1 thread", said)
     assert "compile 0" in order and "impact 1" in order and "impact 0" not in order
 
