@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +11,10 @@ import pytest
 from impacts import begun, finished, result_of
 
 import warp_mca as mca
+from warp_mca.base import outside
+from warp_mca.cli.main import main
+from warp_mca.phases.checkpoint import Checkpoint
+from warp_mca.results.storage import load
 from warp_mca.scene import model_file
 
 
@@ -48,3 +54,54 @@ def goes_on(scene: mca.Scene, folder: Path, device: str = "cpu") -> None:
 def same(one: mca.Result, other: mca.Result) -> bool:
     """Whether two histories have the same bits."""
     return all(np.array_equal(one[name], other[name], equal_nan=True) for name in other.history)
+
+
+def own_law(monkeypatch: pytest.MonkeyPatch, folder: Path, file: str, table: dict, kind: str, script: str) -> str:
+    """A test's file as the module `own_law` of a folder, beside the scene file block.py, as another process finds them.
+
+    Args:
+        file: of the test. table, kind: where the class that the file registers stands, and its name.
+        script: what follows the import of `own_law` in block.py.
+    """
+    for figure in ("warp_mca.results.force_figure.save_forces", "warp_mca.results.energy_figure.save_energies"):
+        monkeypatch.setattr(figure, lambda *_: None)
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    monkeypatch.setattr(outside, "_IMPORTED", {})
+    monkeypatch.delitem(sys.modules, "own_law", raising=False)
+    monkeypatch.delitem(table, kind)
+    shutil.copy(file, "own_law.py")
+    Path("block.py").write_text(f"from own_law import {kind}, block\n\n{script}\n")
+    return "own_law"
+
+
+def runs_on(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    table: dict,
+    kind: str,
+    duration: str,
+    interval: str,
+) -> mca.Result:
+    """The result of block.py with `own_law`; from a model file, and stopped at a checkpoint and resumed, equal bits."""
+    run = ["--import", "own_law", "--duration", duration]
+    assert main(["run", "block.py", "--out", "whole", *run]) == 0
+    assert main(["build", "block.py", "-o", "block.mca"]) == 0
+    del table[kind]
+    assert main(["run", "block.mca", "--out", "file"]) == 2
+    assert "by --import own_law" in capsys.readouterr().err
+    monkeypatch.delitem(sys.modules, "own_law")
+    assert main(["run", "block.mca", "--out", "file", *run]) == 0
+    store = Checkpoint.store
+
+    def store_and_stop(self: Checkpoint, *args: object, **more: object) -> None:
+        store(self, *args, **more)  # pyright: ignore[reportArgumentType]
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Checkpoint, "store", store_and_stop)
+        assert main(["run", "block.mca", "--out", "again", "--checkpoint", interval, *run]) == 130
+    assert main(["resume", "again", "--import", "own_law"]) == 0
+    whole = load("whole")
+    assert same(load("file"), whole) and same(load("again"), whole)
+    return whole

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import shutil
-import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,13 +10,10 @@ import numpy as np
 import pytest
 import warp as wp
 from impacts import prepared
+from outside import own_law, runs_on
 from scipy.integrate import solve_ivp
 
 import warp_mca as mca
-from warp_mca.base import outside
-from warp_mca.cli.main import main
-from warp_mca.phases.checkpoint import Checkpoint
-from warp_mca.results.storage import load
 from warp_mca.scene.contact_laws import CONTACT_LAWS, ContactLaw
 
 wp.set_module_options({"enable_backward": False})
@@ -129,46 +124,18 @@ def test_the_restitution_is_that_of_the_equation_of_motion(zeta: float, case: di
 
 @pytest.fixture
 def outside_module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """This file as the module `own_law` of a folder of its own, with a scene file, as another process finds them."""
-    for figure in ("warp_mca.results.force_figure.save_forces", "warp_mca.results.energy_figure.save_energies"):
-        monkeypatch.setattr(figure, lambda *_: None)
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", list(sys.path))
-    monkeypatch.setattr(outside, "_IMPORTED", {})
-    monkeypatch.delitem(sys.modules, "own_law", raising=False)
-    monkeypatch.delitem(CONTACT_LAWS, "Damped")
-    shutil.copy(__file__, "own_law.py")
-    Path("block.py").write_text("from own_law import block\n\ndef build():\n    return block(2e-5, mu=0.3)\n")
-    return "own_law"
+    return own_law(
+        monkeypatch, tmp_path, __file__, CONTACT_LAWS, "Damped", "def build():\n    return block(2e-5, mu=0.3)"
+    )
 
 
+@pytest.mark.usefixtures("outside_module")
 def test_a_model_file_and_a_run_that_was_stopped_give_the_same_bits(
-    outside_module: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
     """The dashpot's force is in the State: a run that was stopped while it presses goes on to equal bits."""
-    run = ["--import", outside_module, "--duration", "4e-4"]
-    assert main(["run", "block.py", "--out", "whole", *run]) == 0
-    assert main(["build", "block.py", "-o", "block.mca"]) == 0
-    del CONTACT_LAWS["Damped"]
-    assert main(["run", "block.mca", "--out", "file"]) == 2
-    assert f"by --import {outside_module}" in capsys.readouterr().err
-    monkeypatch.delitem(sys.modules, outside_module)
-    assert main(["run", "block.mca", "--out", "file", *run]) == 0
-    store = Checkpoint.store
-
-    def store_and_stop(self: Checkpoint, *args: object, **more: object) -> None:
-        store(self, *args, **more)  # pyright: ignore[reportArgumentType]
-        raise KeyboardInterrupt
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Checkpoint, "store", store_and_stop)
-        assert main(["run", "block.mca", "--out", "again", "--checkpoint", "1.5e-4s", *run]) == 130
-    assert main(["resume", "again", "--import", outside_module]) == 0
-    whole = load("whole")
+    whole = runs_on(monkeypatch, capsys, CONTACT_LAWS, "Damped", "4e-4", "1.5e-4s")
     assert whole.summary["energy"]["damping"] > 0.1 * whole.summary["energy"]["initial"]
-    for name, column in whole.history.items():
-        np.testing.assert_array_equal(load("file").history[name], column)
-        np.testing.assert_array_equal(load("again").history[name], column)
 
 
 def test_scenes_of_a_batch_have_dashpots_of_their_own():

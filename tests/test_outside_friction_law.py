@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import csv
 import math
-import shutil
-import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import warp as wp
+from outside import own_law, runs_on
 
 import warp_mca as mca
-from warp_mca.base import outside
 from warp_mca.cli.main import main
-from warp_mca.phases.checkpoint import Checkpoint
-from warp_mca.results.storage import load
 from warp_mca.scene.friction_laws import FRICTION_LAWS, FrictionLaw
 from warp_mca.scenes import sliding_block
 
@@ -83,47 +79,22 @@ def test_speed_and_heat_are_those_of_the_equation_of_motion(case: dict, device: 
 
 @pytest.fixture
 def outside_module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """This file as the module `own_law` of a folder of its own, with a scene file, as another process finds them."""
-    for figure in ("warp_mca.results.force_figure.save_forces", "warp_mca.results.energy_figure.save_energies"):
-        monkeypatch.setattr(figure, lambda *_: None)
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", list(sys.path))
-    monkeypatch.setattr(outside, "_IMPORTED", {})
-    monkeypatch.delitem(sys.modules, "own_law", raising=False)
-    monkeypatch.delitem(FRICTION_LAWS, "Grease")
-    shutil.copy(__file__, "own_law.py")
-    Path("block.py").write_text(
-        "from own_law import Grease, block\n\ndef build(*, eta: float = 2000.0):\n    return block(Grease(eta=eta))\n"
+    return own_law(
+        monkeypatch,
+        tmp_path,
+        __file__,
+        FRICTION_LAWS,
+        "Grease",
+        "def build(*, eta: float = 2000.0):\n    return block(Grease(eta=eta))",
     )
-    return "own_law"
 
 
+@pytest.mark.usefixtures("outside_module")
 def test_a_model_file_and_a_run_that_was_stopped_give_the_same_bits(
-    outside_module: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
-    run = ["--import", outside_module, "--duration", "2e-3"]
-    assert main(["run", "block.py", "--out", "whole", *run]) == 0
-    assert main(["build", "block.py", "-o", "block.mca"]) == 0
-    del FRICTION_LAWS["Grease"]
-    assert main(["run", "block.mca", "--out", "file"]) == 2
-    assert f"by --import {outside_module}" in capsys.readouterr().err
-    monkeypatch.delitem(sys.modules, outside_module)
-    assert main(["run", "block.mca", "--out", "file", *run]) == 0
-    store = Checkpoint.store
-
-    def store_and_stop(self: Checkpoint, *args: object, **more: object) -> None:
-        store(self, *args, **more)  # pyright: ignore[reportArgumentType]
-        raise KeyboardInterrupt
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Checkpoint, "store", store_and_stop)
-        assert main(["run", "block.mca", "--out", "again", "--checkpoint", "1e-3s", *run]) == 130
-    assert main(["resume", "again", "--import", outside_module]) == 0
-    whole = load("whole")
+    whole = runs_on(monkeypatch, capsys, FRICTION_LAWS, "Grease", "2e-3", "1e-3s")
     assert whole["E_friction"][-1] > 0.01
-    for name, column in whole.history.items():
-        np.testing.assert_array_equal(load("file").history[name], column)
-        np.testing.assert_array_equal(load("again").history[name], column)
 
 
 def test_scenes_of_a_batch_have_parameters_of_their_own():
