@@ -305,7 +305,7 @@ def _(beyond: bool) -> list[str]:
     springs[:, 0, friction] = 1e-3 * 0.5 * mu * dt * np.arange(count // 2)
     springs[:, 0, stored] = 1e-12
     plane = mca.RigidPlane()
-    item = SimpleNamespace(contact=0, mu=mu, sign=1.0, plane=plane, slave=np.arange(3))
+    item = SimpleNamespace(contact=0, mu=mu, sign=1.0, leads=True, plane=plane, slave=np.arange(3))
     model = SimpleNamespace(passes=[item], contact_axes=np.array([[[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]]))
     steps = SimpleNamespace(interval=interval)
     own = ledger({"count": count}, table=lambda first: springs, springs=lambda rows: rows, contact_dt=dt, steps=steps)

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.arrays import Index
+from warp_mca.base.errors import bad_value
 from warp_mca.base.joining import join, offsets
 from warp_mca.model.assembly import Block
 from warp_mca.model.layout import Layout
 from warp_mca.model.mass_scaling import MassScaling
 from warp_mca.model.model import Model
+from warp_mca.physics.contact.skin_edges import EdgePass, no_edges
+from warp_mca.physics.contact.surfaces import ContactPass
 from warp_mca.physics.loads.nodal import check_batch
 
 # what the numbers in a model's arrays count, and how many of them a model has
@@ -61,6 +64,32 @@ def join_models(models: Sequence[Model]) -> Model:
         rigid_blocks=(),  # nothing shows the bodies of a batch
         batch=Layout(nodes=nodes, joints=offsets([len(model.joints) for model in models]), elements=ranges),
     )
+
+
+def with_alike_passes(models: Sequence[Model]) -> list[Model]:
+    """Models of which each has a pass of edges, perhaps an empty one, where another's contact has one.
+
+    Raises:
+        RequestError: a contact keeps out the nodes of both sides in some models only.
+    """
+    sides = [[(item.contact, item.sign) for item in model.passes if not isinstance(item, EdgePass)] for model in models]
+    for k, own in enumerate(sides):
+        if own != sides[0]:
+            raise bad_value(
+                f"contacts of scenes[{k}]", len(own), "some are two-way in it only: give two_way in all scenes"
+            )
+    edged = {item.contact for model in models for item in model.passes if isinstance(item, EdgePass)}
+    return [replace(model, passes=_padded(model.passes, edged)) for model in models]
+
+
+def _padded(passes: Sequence[ContactPass], edged: Collection[int]) -> tuple[ContactPass, ...]:
+    found: list[ContactPass] = []
+    for k, item in enumerate(passes):
+        found.append(item)
+        last = k + 1 == len(passes) or passes[k + 1].contact != item.contact
+        if last and item.contact in edged and not isinstance(item, EdgePass):
+            found.append(no_edges(item))
+    return tuple(found)
 
 
 def _blocks(models: Sequence[Model], nodes: Index, elements: Index) -> tuple[tuple[Block, ...], Index, Index]:

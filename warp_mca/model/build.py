@@ -18,8 +18,8 @@ from warp_mca.model.viscosity import share_of_step, with_viscosity
 from warp_mca.physics.absorbing.nodes import absorbing_nodes
 from warp_mca.physics.contact.auto_penalty import ChosenPenalty, settled
 from warp_mca.physics.contact.axes import contact_axes
-from warp_mca.physics.contact.checks import check_spacing
-from warp_mca.physics.contact.surfaces import ContactPass, contact_eigenvalues, contact_passes
+from warp_mca.physics.contact.skin_edges import edge_eigenvalues, edge_pass
+from warp_mca.physics.contact.surfaces import ContactPass, contact_eigenvalues, contact_passes, is_two_way
 from warp_mca.physics.joints.constraints import check_bindings, constraints, free_nodes, join_bodies, nodes_of
 from warp_mca.physics.loads.joint_loads import hinge_loads, movable_bases
 from warp_mca.physics.loads.nodal import loaded_nodes
@@ -46,7 +46,7 @@ def _contacts(
     for index, contact in enumerate(parts.scene.contacts):
         slave = parts.faces(contact.slave)
         master = None if isinstance(contact.master, RigidPlane) else parts.faces(contact.master)
-        check_spacing(contact, parts.X, slave, master)
+        contact = replace(contact, two_way=is_two_way(contact, slave, master))
         given = contact.penalty not in (None, "auto")
         contact, chosen = settled(parts, contact, slave, master, velocity)
         penalties.append(chosen)
@@ -57,6 +57,10 @@ def _contacts(
             np.add.at(added, nodes, bounce_factor(contact, parts.scene) * value)
             decay = item.damping * float(value.max()) / item.stiffening if item.damping else 0.0
             passes.append(replace(item, penalty_given=given, decay=decay))
+        if master is not None and (edges := edge_pass(parts.X, passes[-1 - contact.two_way], slave, master, contact)):
+            nodes, value = edge_eigenvalues(edges, parts.mass)
+            added[nodes] += bounce_factor(contact, parts.scene) * value
+            passes.append(edges)
         axes[index] = contact_axes(parts.X, contact, slave, master)
     return tuple(passes), axes, added, tuple(penalties)
 

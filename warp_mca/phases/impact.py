@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import GuardError, bad_value
 from warp_mca.base.garbage import few_collections
 from warp_mca.base.joining import offsets
-from warp_mca.model.batch_model import join_models
+from warp_mca.model.batch_model import join_models, with_alike_passes
 from warp_mca.model.paths import join_probes
 from warp_mca.model.sensors import join_sensors
 from warp_mca.phases.division import divide_alike
@@ -82,6 +83,8 @@ class Impact:
         Raises:
             RequestError: steps cannot be chosen, or bodies overlap that must not.
         """
+        alike = with_alike_passes([item.model for item in ready])
+        ready = [replace(item, model=model) for item, model in zip(ready, alike, strict=True)]
         self.ready = tuple(ready)
         self.steps = divide_alike([(item.scene, item.model) for item in ready], span)
         model = join_models([item.model for item in ready])

@@ -112,7 +112,7 @@ def sights(info: RunInfo) -> Sights:
     """Where the first views look: at the bodies that strike, and at the place where contact is expected."""
     points = np.concatenate([info.model.X[info.surfaces[body].nodes] for body in info.striking])
     bounds = np.array([points.min(axis=0), points.max(axis=0)])
-    passes = [item for item in info.model.passes if item.sign > 0.0 and len(item.slave)]
+    passes = [item for item in info.model.passes if item.leads]
     if not passes:
         return Sights(up_of(info.scene), bounds, None)
     distances = [_distances(info, item) for item in passes]

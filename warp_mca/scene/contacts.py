@@ -66,7 +66,8 @@ class Contact:
         law: force along the normal over depth and stiffness; the linear spring k g by default.
         friction: law that changes the limit mu F_n of the friction force, or several that do in turn, as
             (DecayingFriction(kinetic=0.2, decay=2.0), ShearCap(tau_max=1e8)); Coulomb's limit by default.
-        two_way: the master's nodes are also kept out of the slave's faces.
+        two_way: whether the master's nodes are also kept out of the slave's faces. None does so where the slave's faces
+            are more than 1.5 times as wide as the master's.
         initial_overlap: what to do where bodies overlap before the first step: "refuse" the scene; start "stress_free",
             with springs that count depth from there; or "press", with the springs' full force.
         name: unique in the scene; None for the bodies' names, "slave–master" or "slave–plane", numbered where a pair
@@ -82,7 +83,7 @@ class Contact:
     master: Surface | RigidPlane
     mu: float = 0.0
     penalty: float | Literal["auto"] | None = None
-    two_way: bool = False
+    two_way: bool | None = None
     initial_overlap: Literal["refuse", "stress_free", "press"] = "refuse"
     name: str | None = None
     normal: Vec3 | None = None
@@ -108,7 +109,8 @@ class Contact:
             remedy = f"give a coefficient of friction from 0 to {MOST_FRICTION:g}"
             raise bad_value("Contact.mu", self.mu, remedy)
         self._check_friction()
-        validate.flags("Contact", two_way=self.two_way)
+        if self.two_way is not None:
+            validate.flags("Contact", two_way=self.two_way)
         if self.two_way and isinstance(self.master, RigidPlane):
             raise bad_value("Contact.two_way", self.two_way, "a rigid plane has no nodes; leave two_way off")
         if isinstance(self.master, Surface) and self.master.body == self.slave.body:

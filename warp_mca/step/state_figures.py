@@ -19,7 +19,7 @@ def max_plastic_strain(solver: Solver, state: State, scene: int = 0) -> float:
 
 def max_penetration(solver: Solver, state: State, scene: int = 0) -> float:
     """Greatest depth that a slave node of a scene reached below its master [m]."""
-    return max((float(stage.depths(state, scene).max()) for stage in solver.contacts), default=0.0)
+    return max((float(stage.depths(state, scene).max(initial=0.0)) for stage in solver.contacts), default=0.0)
 
 
 def max_normal_force(solver: Solver, state: State, scene: int = 0) -> float:

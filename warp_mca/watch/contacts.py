@@ -31,8 +31,12 @@ BOUND = 0.1  # component of a normal along an axis from which on a node that is 
 )
 def small_patch(c: Finished, patch: float) -> Iterator[Values]:
     """Nodes that carried each contact when its force was greatest."""
+    greatest = c.ledger.kept.peaks[:, 0]
     for k, item in enumerate(c.model.passes):
-        if item.sign > 0.0 and (count := _few_nodes(c, k, patch)):
+        own = [
+            greatest[other] for other, it in enumerate(c.model.passes) if it.contact == item.contact and it.sign > 0.0
+        ]
+        if item.sign > 0.0 and greatest[k] == max(own) and (count := _few_nodes(c, k, patch)):
             at_all = "less than three cells across" if is_curved_contact(c.model.X, item) else "a corner or an edge"
             yield dict(body=c.scene.contacts[item.contact].slave.body, count=count, at_all=at_all)
 
@@ -87,7 +91,7 @@ def undented_master(c: Finished, least: float) -> Iterator[Values]:
     """Area of a curved contact over that of the faces of a master that is not rigid."""
     for k, item in enumerate(c.model.passes):
         contact = c.scene.contacts[item.contact]
-        if isinstance(contact.master, RigidPlane) or item.sign < 0.0 or contact.master.body in c.scene.rigid_names:
+        if isinstance(contact.master, RigidPlane) or not item.leads or contact.master.body in c.scene.rigid_names:
             continue
         if _few_nodes(c, k, PATCH):  # they do not tell how wide the pressed place is
             continue
@@ -130,7 +134,7 @@ def symmetry_of(model: Model) -> dict[int, Array]:
 
     A plane of symmetry holds some nodes of the slave along an axis, and leaves others free.
     """
-    first = [item for item in model.passes if item.sign > 0.0]
+    first = [item for item in model.passes if item.leads]
     return {item.contact: np.eye(3)[[0.0 < share < 1.0 for share in _held(model, item)]] for item in first}
 
 

@@ -79,7 +79,7 @@ def path_without_stress(c: Context, _: float) -> Iterator[Values]:
 @advice(
     "faces of the slave {slave} are {ratio:.2g} times as wide as those of its master, whose nodes pass between its "
     "own:",
-    "make the finer side the slave, or set two_way",
+    "make the finer side the slave, or leave two_way out",
     1.5,
     "times as wide at most; where it is 2, a third of the force is missing",
 )
@@ -89,7 +89,7 @@ def coarse_slave(c: Context, most: float) -> Iterator[Values]:
     The lesser of the ratio of the smallest and that of the usual: faces far from contact may be of any size.
     """
     for contact in c.scene.contacts:
-        if contact.two_way or isinstance(contact.master, RigidPlane):
+        if contact.two_way is not False or isinstance(contact.master, RigidPlane):
             continue
         sides = ((c.meshes[side.body], side.nodes) for side in (contact.slave, contact.master))
         slave, master = (face_geometry(mesh.points, mesh.surface(nodes)[0])[0] for mesh, nodes in sides)

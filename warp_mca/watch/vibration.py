@@ -81,7 +81,7 @@ def ringing(c: Finished, times: float) -> Iterator[Values]:
     for item in c.model.passes:
         contact, history = c.scene.contacts[item.contact], c.contacts[item.contact]
         greatest = float(history.pressure.max(initial=0.0))
-        if item.sign < 0.0 or greatest == 0.0 or not _is_first_impact(c, contact, item):
+        if not item.leads or greatest == 0.0 or not _is_first_impact(c, contact, item):
             continue
         most = _greatest_force(c, contact, item, c.ledger.steps.interval * int(history.pressure.argmax()))
         if greatest > times * most > 0.0:

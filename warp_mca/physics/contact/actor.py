@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -11,13 +11,23 @@ import numpy as np
 from warp_mca.kernels.contact import contact
 from warp_mca.kernels.contact.spring_sums import sum_springs
 from warp_mca.physics.actor import Actor, When
+from warp_mca.physics.contact.edge_stage import EdgeStage
 from warp_mca.physics.contact.extremes import NormalForce
+from warp_mca.physics.contact.skin_edges import EdgePass
 from warp_mca.physics.contact.stage import ContactStage, ContactState
 from warp_mca.step.stage import BESIDE, BEYOND, LISTS, SPRINGS, Search, Stage, Step
 
 if TYPE_CHECKING:
+    from warp_mca.model.model import Model
+    from warp_mca.physics.contact.surfaces import ContactPass
     from warp_mca.step.solver import Solver
     from warp_mca.step.state import State
+
+
+def stage_of(items: Sequence[ContactPass], model: Model, index: int, normal_force: NormalForce) -> ContactStage:
+    """The stage of a pass of each scene, on the current device."""
+    edges = [item for item in items if isinstance(item, EdgePass)]
+    return EdgeStage(edges, model, index, normal_force) if edges else ContactStage(items, model, index, normal_force)
 
 
 class Contacts(list[ContactStage], Actor):
@@ -34,7 +44,7 @@ class Contacts(list[ContactStage], Actor):
         model, count = solver.model, len(solver.model.passes) // solver.layout.count
         scenes = [model.passes[k * count : (k + 1) * count] for k in range(solver.layout.count)]
         self.solver, self.normal_force = solver, NormalForce(scenes if count else [], solver.threads)
-        super().__init__(ContactStage(model.passes[k::count], model, k, self.normal_force) for k in range(count))
+        super().__init__(stage_of(model.passes[k::count], model, k, self.normal_force) for k in range(count))
 
     @property
     def blocks(self) -> int:

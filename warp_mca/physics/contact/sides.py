@@ -13,8 +13,8 @@ BENT = math.cos(math.radians(0.1))  # between the normals of neighbouring faces 
 MAX_SIDES = 6  # of a surface; where rough faces need more, sides share numbers
 
 
-def _neighbours(face: Index) -> tuple[Index, Index]:
-    """Pairs of faces that share an edge, two arrays of shape (pair_count,)."""
+def neighbours(face: Index) -> tuple[Index, Index, Index]:
+    """Pairs of faces that share an edge, two arrays of shape (pair_count,), and its nodes, shape (pair_count, 2)."""
     corner, following = face.ravel(), np.roll(face, -1, axis=1).ravel()
     edge = np.sort(np.column_stack([corner, following]), axis=1)
     owner = np.repeat(np.arange(len(face), dtype=np.int32), 4)
@@ -23,12 +23,12 @@ def _neighbours(face: Index) -> tuple[Index, Index]:
     order = np.lexsort((edge[:, 1], edge[:, 0]))
     edge, owner = edge[order], owner[order]
     same = (edge[1:] == edge[:-1]).all(axis=1)
-    return owner[:-1][same], owner[1:][same]
+    return owner[:-1][same], owner[1:][same], edge[1:][same]
 
 
 def _edges(face: Index, normal: Array) -> tuple[Index, Index, Array]:
     """Pairs of faces that share an edge, and the cosine between their normals, shape (pair_count,)."""
-    first, second = _neighbours(face)
+    first, second, _ = neighbours(face)
     unit = normal / np.linalg.norm(normal, axis=1, keepdims=True)
     return first, second, (unit[first] * unit[second]).sum(axis=1)
 

@@ -18,10 +18,12 @@ if TYPE_CHECKING:
     from warp_mca.step.workspace import Workspace
 
 
-def new_springs(stage: ContactStage) -> Any:
-    """Springs that no face presses. Where some begin free of stress, their resting depth is 0."""
-    count, found = int(stage.springs[-1]), spring.Spring()
-    sided = count if stage.sides > 1 else 0
+def new_springs(count: int, sided: int, stage: ContactStage) -> Any:
+    """Springs of a pass that nothing presses, as many as `sided` of which are of masters with several sides.
+
+    Where some begin free of stress, their resting depth is 0.
+    """
+    found = spring.Spring()
     numbers = "energy friction drive normal_impulse stick_impulse depth lost made stiffness"
     for name in ("tangential", "force", "impulse"):
         setattr(found, name, wp.zeros(count, dtype=wp.vec3d))

@@ -47,7 +47,7 @@ def _vectors(values: Sequence[Any]) -> Any:
 
 def has_sides(model: Model) -> bool:
     """Whether a master of the model has several sides, which need the latest forces on nodes."""
-    return any(item.sides > 1 for item in model.passes)
+    return any(item.side.any() for item in model.passes)
 
 
 @dataclass(eq=False)
@@ -85,24 +85,7 @@ class ContactStage:
 
     def __init__(self, items: Sequence[ContactPass], model: Model, index: int, normal_force: NormalForce) -> None:
         """Allocate on the current device; `normal_force` says how normal forces are summed."""
-        self.items, self.index, self.column = items, index, PASS + PASS_COLUMNS * index
-        self.per_newton, self.node_count = normal_force.per_newton, model.node_count
-        self.each = len(items) > 1
-        self.sides = max(item.sides for item in items)
-        self.noted = has_sides(model)
-        slaves = offsets([len(item.slave) for item in items])
-        self.springs = self.sides * slaves
-        self.first = wp.array(self.springs, dtype=wp.int32)
-        self.slave_scene = per_scene(slaves)
-        self.slave = wp.array(self._join("slave"), dtype=wp.int32)
-        self.stiffness = wp.array(self._join("stiffness"), dtype=wp.float64)
-        self.mu = _numbers([item.mu for item in items])
-        self.stress_free = any(item.initial_overlap == "stress_free" for item in items)
-        self.laws = Laws(items[0].law, items[0].friction)
-        check_dashpots(items)
-        rows = np.repeat([item.parameters for item in items], np.diff(self.springs), axis=0)
-        self.parameters = wp.array(rows, dtype=wp.float64, ndim=2)
-        self.friction_parameters = wp.array(friction_rows(items, self.sides), dtype=wp.float64, ndim=2)
+        self._begin(items, model, index, normal_force)
         friction = any(item.mu > 0.0 for item in items)
         if items[0].plane is not None:
             self.kernel = contact.plane_kernel(friction, self.each, self.stress_free, self.laws)
@@ -121,6 +104,27 @@ class ContactStage:
         self.find = search.candidates_kernel(self.each, self.sides)
         self.clear = search.clear_kernel(self.each, self.sides)
         self._make_faces(model)
+
+    def _begin(self, items: Sequence[ContactPass], model: Model, index: int, normal_force: NormalForce) -> None:
+        """What springs need, whatever presses them."""
+        self.items, self.index, self.column = items, index, PASS + PASS_COLUMNS * index
+        self.per_newton, self.node_count = normal_force.per_newton, model.node_count
+        self.each = len(items) > 1
+        self.sides = max(item.sides for item in items)
+        self.noted = has_sides(model)
+        slaves = offsets([len(item.slave) for item in items])
+        self.springs = self.sides * slaves
+        self.first = wp.array(self.springs, dtype=wp.int32)
+        self.slave_scene = per_scene(slaves)
+        self.slave = wp.array(self._join("slave"), dtype=wp.int32)
+        self.stiffness = wp.array(self._join("stiffness"), dtype=wp.float64)
+        self.mu = _numbers([item.mu for item in items])
+        self.stress_free = any(item.initial_overlap == "stress_free" for item in items)
+        self.laws = Laws(items[0].law, items[0].friction)
+        check_dashpots(items)
+        rows = np.repeat([item.parameters for item in items], np.diff(self.springs), axis=0)
+        self.parameters = wp.array(rows, dtype=wp.float64, ndim=2)
+        self.friction_parameters = wp.array(friction_rows(items, self.sides), dtype=wp.float64, ndim=2)
 
     def _join(self, name: str) -> NDArray:
         return np.concatenate([getattr(item, name) for item in self.items])
@@ -141,7 +145,7 @@ class ContactStage:
         lists, faces = (int(self.springs[-1]), len(self.face)) if surface else (0, 0)
         room = max(item.room for item in self.items)
         return ContactState(
-            spring=new_springs(self),
+            spring=new_springs(int(self.springs[-1]), int(self.springs[-1]) if self.sides > 1 else 0, self),
             count=wp.zeros(lists, dtype=wp.int32),
             candidate=wp.zeros((lists, LIST_LENGTH), dtype=wp.int32),
             face_count=wp.zeros(faces, dtype=wp.int32),
@@ -159,9 +163,8 @@ class ContactStage:
     def _make_faces(self, model: Model) -> None:
         faces = offsets([len(item.face) for item in self.items])
         masters = offsets([len(item.master) for item in self.items])
-        self.margin = _numbers([item.margin for item in self.items])
         self.longest = _numbers([item.longest for item in self.items])
-        self.origin = _vectors([model.X[item.master].mean(axis=0) for item in self.items])
+        self._place(model)
         self.face_scene, self.master_scene = per_scene(faces), per_scene(masters)
         self.face = wp.array(self._join("face"), dtype=wp.int32)
         self.face_stiffness = wp.array(self._join("face_stiffness"), dtype=wp.float64)
@@ -175,6 +178,11 @@ class ContactStage:
         self.lower = wp.zeros(len(self.face), dtype=wp.vec3f)
         self.upper = wp.zeros(len(self.face), dtype=wp.vec3f)
         self.bvh: Any = None
+
+    def _place(self, model: Model) -> None:
+        """Where the search looks, and how far ahead."""
+        self.margin = _numbers([item.margin for item in self.items])
+        self.origin = _vectors([model.X[item.master].mean(axis=0) for item in self.items])
 
     @property
     def on_plane(self) -> bool:
@@ -221,6 +229,10 @@ class ContactStage:
             return
         inputs = [work.X, u, self.face, self.face_scene, self.origin, self.margin]
         wp.launch(self.bounds, len(self.face), inputs=inputs, outputs=[self.lower, self.upper])
+        self._fit()
+
+    def _fit(self) -> None:
+        """The tree of boxes, anew or as they have moved."""
         if self.bvh is None:
             self.bvh = wp.Bvh(self.lower, self.upper, groups=self.face_scene if self.each else None)
         else:
