@@ -11,8 +11,9 @@ import numpy as np
 from warp_mca.kernels.contact import contact
 from warp_mca.kernels.contact.spring_sums import sum_springs
 from warp_mca.physics.actor import Actor, When
+from warp_mca.physics.contact.contact_state import ContactState
 from warp_mca.physics.contact.extremes import NormalForce
-from warp_mca.physics.contact.stage import ContactStage, ContactState
+from warp_mca.physics.contact.stage import ContactStage
 from warp_mca.step.stage import BESIDE, BEYOND, LISTS, SPRINGS, Search, Stage, Step
 
 if TYPE_CHECKING:

@@ -13,7 +13,8 @@ from warp_mca.kernels.contact.laws import LINEAR, law_functions
 from warp_mca.step.threads import CONTACT, Split
 
 if TYPE_CHECKING:
-    from warp_mca.physics.contact.stage import ContactStage, ContactState
+    from warp_mca.physics.contact.contact_state import ContactState
+    from warp_mca.physics.contact.stage import ContactStage
     from warp_mca.step.state import State
     from warp_mca.step.workspace import Workspace
 
@@ -64,7 +65,8 @@ class SlaveEdges:
     def list_faces(self, stage: ContactStage, work: Workspace, state: State, u: wp.array) -> None:
         """Add to the lists of a search the faces along edges from nodes that slid off a side."""
         own = state.contacts[stage.index]
-        inputs = [stage.bvh.id, work.X, u, self.faces, stage.side, stage.slave_scene, stage.origin, own.spring]
+        inputs = [stage.bvh.id, work.X, u, self.faces, stage.side, stage.slave_scene, stage.origin]
+        inputs += [stage.pairs_of(own), own.spring]
         lists = [own.count, own.candidate, own.face_count, own.face_slave]
         wp.launch(self.find, len(stage.slave), inputs, [*lists, state.flag])
 
