@@ -33,7 +33,7 @@ def general_pass(parts: Assembly, contact: ContactAll, index: int) -> tuple[Cont
     curved = [is_curved(skin.node, skin.normal) for skin in skins]
     for one, other in pairs:
         a, b = number[one], number[other]
-        default = CURVED if curved[a] or curved[b] else FLAT
+        default = CURVED if a != b and (curved[a] or curved[b]) else FLAT
         factor[a, b] = factor[b, a] = 0.5 * (default if contact.penalty is None else float(contact.penalty))
     union = Faces(*(np.concatenate([getattr(skin, name) for skin in skins]) for name in Faces.__dataclass_fields__))
     own = union.contact if contact.penalty is None else union.bulk
