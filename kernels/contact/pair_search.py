@@ -6,6 +6,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.edge_shares import slid_off
+from warp_mca.kernels.contact.edges import SlaveFaces, area_vector
 from warp_mca.kernels.contact.pairs import Pairs, may_meet, spring_of
 from warp_mca.kernels.contact.projection import project_on_face
 from warp_mca.kernels.contact.search import EQUAL, OVERFLOW, distance_to_face, list_slave, root_function
@@ -13,6 +14,41 @@ from warp_mca.kernels.contact.spring import ANY_DEPTH, Spring
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 
 _NONE = 1 << 30  # larger than the number of any body
+
+
+@wp.func
+def opposes(
+    X: wp.array(dtype=wp.vec3d),
+    u: wp.array(dtype=wp.vec3d),
+    slaves: SlaveFaces,
+    s: int,
+    face: wp.array2d(dtype=wp.int32),
+    f: int,
+) -> bool:
+    """Whether a face around slave node s looks against face f: else that is the far side of a layer."""
+    normal = area_vector(X, u, face, f)
+    found = bool(False)
+    for j in range(slaves.offset[s], slaves.offset[s + 1]):
+        own = area_vector(X, u, slaves.face, slaves.face_of_slave[j])
+        found = found or wp.dot(own, normal) < wp.float64(0.0)
+    return found
+
+
+@wp.func
+def is_listed(
+    X: wp.array(dtype=wp.vec3d),
+    u: wp.array(dtype=wp.vec3d),
+    slaves: SlaveFaces,
+    s: int,
+    face: wp.array2d(dtype=wp.int32),
+    f: int,
+    pairs: Pairs,
+) -> bool:
+    """Whether slave node s may touch face f until the next search."""
+    found = may_meet(pairs, s, f)
+    if found and pairs.own[s] == pairs.body[f]:
+        found = opposes(X, u, slaves, s, face, f)
+    return found
 
 
 @cache
@@ -36,7 +72,8 @@ def slots_kernel(each: bool, sides: int) -> Any:
         bvh: wp.uint64,
         X: wp.array(dtype=wp.vec3d),
         u: wp.array(dtype=wp.vec3d),
-        slave: wp.array(dtype=wp.int32),
+        slaves: SlaveFaces,
+        face: wp.array2d(dtype=wp.int32),
         pairs: Pairs,
         scene: Index,
         origin: Vector,
@@ -51,7 +88,7 @@ def slots_kernel(each: bool, sides: int) -> Any:
                 kept = kept or is_kept(e, spring)
             if not kept:
                 slot_out[s, q] = -1
-        i = slave[s]
+        i = slaves.node[s]
         k = of(scene, s)
         point = wp.vec3f(X[i] + u[i] - of(origin, k))
         for q in range(slot_out.shape[1]):
@@ -65,7 +102,7 @@ def slots_kernel(each: bool, sides: int) -> Any:
                     for p in range(slot_out.shape[1]):
                         taken = taken or slot_out[s, p] == body
                     if not taken and body < lowest:
-                        if may_meet(pairs, s, f):
+                        if is_listed(X, u, slaves, s, face, f, pairs):
                             lowest = body
                 if lowest == _NONE:
                     break
@@ -85,7 +122,8 @@ def candidates_kernel(each: bool, sides: int) -> Any:
         bvh: wp.uint64,
         X: wp.array(dtype=wp.vec3d),
         u: wp.array(dtype=wp.vec3d),
-        slave: wp.array(dtype=wp.int32),
+        slaves: SlaveFaces,
+        face: wp.array2d(dtype=wp.int32),
         pairs: Pairs,
         side: Side,
         scene: Index,
@@ -98,7 +136,7 @@ def candidates_kernel(each: bool, sides: int) -> Any:
         flag_out: wp.array2d(dtype=wp.int32),
     ):
         s = wp.tid()
-        i = slave[s]
+        i = slaves.node[s]
         u_search_out[i] = u[i]
         k = of(scene, s)
         point = wp.vec3f(X[i] + u[i] - of(origin, k))
@@ -107,7 +145,7 @@ def candidates_kernel(each: bool, sides: int) -> Any:
         f = int(0)
         query = wp.bvh_query_aabb(bvh, point, point, root_of(bvh, k))
         while wp.bvh_query_next(query, f):
-            if may_meet(pairs, s, f):
+            if is_listed(X, u, slaves, s, face, f, pairs):
                 e = spring_of(pairs, s, f, of_face(side, f), wp.static(sides))
                 found = count_out[e]
                 if found < candidate_out.shape[1]:

@@ -10,7 +10,7 @@ import numpy as np
 from warp_mca.base.arrays import Array, Index
 from warp_mca.physics.contact.pairs import SLOTS, Pairs
 from warp_mca.physics.contact.sides import is_curved
-from warp_mca.physics.contact.surfaces import CURVED, FLAT, ContactPass, Faces, node_mean, surface_pass
+from warp_mca.physics.contact.surfaces import CURVED, FLAT, LONGEST_LIST, ContactPass, Faces, node_mean, surface_pass
 from warp_mca.scene import ContactAll, Surface
 
 if TYPE_CHECKING:
@@ -44,7 +44,8 @@ def general_pass(parts: Assembly, contact: ContactAll, index: int) -> tuple[Cont
     folds = [bool(factor[k, k]) for k in range(len(names))]
     offset, barred = _barred(parts.X, union, item, np.array(folds)[face_of])
     body, faces = slave_of[order].astype(np.int32), face_of.astype(np.int32)
-    item = replace(item, pairs=Pairs(body=body, face=faces, factor=factor, barred_offset=offset, barred=barred))
+    room = min(2 * item.room, LONGEST_LIST) if any(folds) else item.room  # folds crush cells
+    item = replace(item, room=room, pairs=Pairs(body=body, face=faces, factor=factor, barred_offset=offset, barred=barred))
     return item, _eigenvalues(parts.mass, item, union)
 
 

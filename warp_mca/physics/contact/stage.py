@@ -19,7 +19,7 @@ from warp_mca.physics.contact.dashpots import check_dashpots
 from warp_mca.physics.contact.friction_laws import friction_rows
 from warp_mca.physics.contact.pairs import SLOTS, device_pairs
 from warp_mca.physics.contact.per_scene import numbers, per_scene, vectors
-from warp_mca.physics.contact.slave_edges import SlaveEdges, new_springs
+from warp_mca.physics.contact.slave_edges import SlaveEdges, faces_of_slaves, new_springs
 from warp_mca.physics.contact.surfaces import LIST_LENGTH, ContactPass
 from warp_mca.step.threads import CONTACT, Split, whole
 
@@ -137,9 +137,11 @@ class ContactStage:
         self.master = wp.array(self._join("master"), dtype=wp.int32)
         self.face_offset, self.face_of_node = self._rows("face", "face_offset", "face_of_node")
         self.pairs, self.edges = device_pairs([item.pairs for item in self.items]), None
-        if self.sides > 1:
+        if self.sides > 1 or self.general:
             rows = self._rows("slave_face", "slave_offset", "face_of_slave")
-            self.edges = SlaveEdges(self, self._join("slave_face"), rows)
+            self.slave_faces = faces_of_slaves(self, self._join("slave_face"), rows)
+        if self.sides > 1:
+            self.edges = SlaveEdges(self)
         self.lower = wp.zeros(len(self.face), dtype=wp.vec3f)
         self.upper = wp.zeros(len(self.face), dtype=wp.vec3f)
         self.bvh: Any = None
@@ -205,9 +207,9 @@ class ContactStage:
         """Second part of a search: the lists, which contact reads."""
         if self.on_plane:
             return
-        own, slaves = state.contacts[self.index], [work.X, u, self.slave]
+        own, places = state.contacts[self.index], [self.bvh.id, work.X, u]
         own.face_count.zero_()
-        inputs = [self.bvh.id, *slaves, *self._tables(own)]
+        inputs = [*places, *([self.slave_faces, self.face, self.pairs_of(own)] if self.general else [self.slave])]
         if self.slots:
             spaces = [self.slave_scene, self.origin, own.spring]
             wp.launch(self.slots, len(self.slave), inputs=[*inputs, *spaces], outputs=[own.slot])
