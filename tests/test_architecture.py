@@ -16,7 +16,7 @@ from test_style import entries
 
 import warp_mca as mca
 from warp_mca.physics.absorbing.stage import AbsorbingState
-from warp_mca.physics.contact.stage import ContactState
+from warp_mca.physics.contact.contact_state import ContactState
 from warp_mca.physics.elements.state import ElementState
 from warp_mca.physics.floating.frames import with_floating_frames
 from warp_mca.physics.floating.stage import FloatingState

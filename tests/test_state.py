@@ -27,7 +27,7 @@ import warp_mca as mca
 from warp_mca.base.errors import RequestError
 from warp_mca.kernels.contact.spring import Spring
 from warp_mca.phases.impact import Impact
-from warp_mca.physics.contact.stage import ContactState
+from warp_mca.physics.contact.contact_state import ContactState
 from warp_mca.physics.elements.state import ElementState
 from warp_mca.physics.joints.constraint_stage import ConstraintState
 from warp_mca.physics.loads.stage import LoadState

@@ -7,6 +7,7 @@ import warp as wp
 
 from warp_mca.kernels.contact.laws import PLAIN, Laws
 from warp_mca.kernels.contact.nearest import Master, nearest_face
+from warp_mca.kernels.contact.pairs import Pairs, pair_factor
 from warp_mca.kernels.contact.search import STALE, TOO_DEEP, moved_too_far
 from warp_mca.kernels.contact.settle import meet_side, settle_functions
 from warp_mca.kernels.contact.spring import Spring, open_function, pressure_function, rest_function, spring_function
@@ -22,7 +23,12 @@ LANES = 4  # GPU threads per master node, which share the faces around it
 
 @cache
 def surface_kernel(
-    friction: bool, each: bool, stress_free: bool = False, laws: Laws = PLAIN, noted: bool = False
+    friction: bool,
+    each: bool,
+    stress_free: bool = False,
+    laws: Laws = PLAIN,
+    noted: bool = False,
+    general: bool = False,
 ) -> Any:
     """Kernel: push each slave node that penetrates a candidate face back along the normal of that face.
 
@@ -34,11 +40,12 @@ def surface_kernel(
     where the node slides on to a softer face, and the energy that the spring loses then is booked; it does not rise
     until the spring opens.
     `stress_free`: springs of bodies that overlap at the start begin without force. `noted`: keep the recent force on
-    each node, which masters with several sides need.
+    each node, which masters with several sides need. `general`: springs have the factors of `Pairs`.
     """
     settle, let_go = settle_functions(friction, stress_free, laws)
     pressure = pressure_function(friction)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
+    Table = Pairs if general else wp.int32
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, launch_bounds=(BLOCK_DIM, 4))
     def touch_surface(
@@ -50,6 +57,7 @@ def surface_kernel(
         slave: wp.array(dtype=wp.int32),
         stiffness: wp.array(dtype=wp.float64),
         master: Master,
+        pairs: Table,
         scene: Index,
         mu: Real,
         margin: Real,
@@ -71,6 +79,10 @@ def surface_kernel(
         held = spring.held[s]
         if near.face >= 0:
             touch = meet_side(v, master, i, near, stiffness[s], dt, held, along)
+            if wp.static(general):
+                factor = pair_factor(pairs, s, near.face)
+                touch.own *= factor
+                touch.limit *= factor
             force = settle(s, k, near, touch, of(mu, k), of(per_newton, k), spring, normal_force_out, flag_out)
             nodal_force_out[i] = nodal_force_out[i] + force
             if wp.static(noted):

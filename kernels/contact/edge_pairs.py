@@ -24,12 +24,17 @@ class SkinEdges:
         beside: corners of the two faces that meet there, shape (edge_count, 8), int32.
         size: edge of a square face as large as those [m], shape (edge_count,), float64.
         stiffness: penalty stiffness of each [N/m], shape (edge_count,), float64.
+        body: in a general contact, body of each edge of the master, and row of `factor` for each of the slave, shape
+            (edge_count,), int32; else empty.
+        factor: of the stiffness between two bodies, 0 where they do not meet; else empty.
     """
 
     node: wp.array2d(dtype=wp.int32)
     beside: wp.array2d(dtype=wp.int32)
     size: wp.array(dtype=wp.float64)
     stiffness: wp.array(dtype=wp.float64)
+    body: wp.array(dtype=wp.int32)
+    factor: wp.array(dtype=wp.float64)
 
 
 @wp.struct
@@ -170,6 +175,21 @@ def lies_clear(
         if way < wp.float64(_NEAR) * size and front < wp.float64(_CLEAR) * size:
             clear = bool(False)
     return clear
+
+
+@wp.func
+def pair_factor(slave: SkinEdges, master: SkinEdges, a: int, b: int) -> wp.float64:
+    """Factor of the stiffness between two edges; 0 if they do not meet: in a general contact each pair counts once."""
+    factor = wp.float64(1.0)
+    if slave.factor.shape[0] > 0:
+        factor = slave.factor[slave.body[a] + master.body[b]]
+        near = a >= b
+        for c in range(8):
+            for d in range(8):
+                near = near or slave.beside[a, c] == master.beside[b, d]
+        if near:
+            factor = wp.float64(0.0)
+    return factor
 
 
 @wp.func

@@ -11,9 +11,10 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.edge_shares import slid_off
-from warp_mca.kernels.contact.edges import Surfaces, area_vector, lies_below, middle, neighbour
+from warp_mca.kernels.contact.edges import Surfaces, area_vector, greatest_stiffness, lies_below, middle, neighbour
 from warp_mca.kernels.contact.laws import Laws
 from warp_mca.kernels.contact.nearest import ABOVE, Nearest, edge_of, nearest_face, reachable
+from warp_mca.kernels.contact.pairs import neighbours_spring, same_solid
 from warp_mca.kernels.contact.settle import Touch, meet, settle_functions
 from warp_mca.kernels.contact.side_choice import NodeSprings
 from warp_mca.kernels.contact.spring import FAR, Spring, pressure_function
@@ -91,8 +92,8 @@ def meet_edge(
     near = support.near
     touch = meet(v, at.master.face, i, near, dt, spring.held[e], along)
     touch.du += dt * (wp.float64(1.0) - support.share) * (v[support.inner] - v[i])
-    touch.own = at.slaves.stiffness[s]
-    touch.limit = at.master.stiffness[near.face]
+    touch.own = greatest_stiffness(at, s, near.face)
+    touch.limit = touch.own
     touch.begins = wp.float64(0.0)
     edge = edge_of(near)
     approach = wp.dot(touch.du, near.normal)
@@ -157,7 +158,7 @@ def support_function(sides: int) -> Any:
                 for back in range(2):
                     other = neighbour(at.slaves.face, g, i, 1 + 2 * back)
                     inside = wp.dot(at_edge - at.X[other] - at.u[other], across)
-                    e_other = wp.static(sides) * at.slaves.number[other] + e - node.begin
+                    e_other = neighbours_spring(at.pairs, s, e, at.slaves.number[other], wp.static(sides))
                     if inside > wp.float64(0.0) and spring.bears[e_other] == 1:
                         share = inside / (inside + outside)
                         if share > most and lies_on(at, e_other, at.X[other] + at.u[other], own, along):
@@ -172,6 +173,7 @@ def support_function(sides: int) -> Any:
                 rests = support.near.face >= 0 and wp.dot(own, support.near.normal) < wp.float64(0.0)
                 if rests:  # not `and`: Warp evaluates both of its sides
                     rests = lies_below(at.X, at.u, at.master.face, f, support.near.face, support.near.normal)
+                    rests = rests and same_solid(at.pairs, f, support.near.face)
                 if not rests:  # a face across a fold stands above the side
                     support.edge = -1
                 else:

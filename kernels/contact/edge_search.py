@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.contact.edge_pairs import REACH, SkinEdges
+from warp_mca.kernels.contact.edge_pairs import REACH, SkinEdges, pair_factor
 from warp_mca.kernels.contact.search import OVERFLOW, list_slave, root_function, sort_row
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 
@@ -103,11 +103,13 @@ def near_edges_kernel(each: bool) -> Any:
         b = int(0)
         found = int(0)
         while wp.bvh_query_next(query, b):
+            factor = pair_factor(slave, master, a, b)
             m = master.node[b, 0]
             n = master.node[b, 1]
             other = X[m] + u[m]
             far = of(scene_margin, k) + wp.float64(REACH) * wp.min(slave.size[a], master.size[b])
-            if distance_of_edges(start, along, other, X[n] + u[n] - other) < far:
+            near = distance_of_edges(start, along, other, X[n] + u[n] - other) < far
+            if near and factor > wp.float64(0.0):
                 if found < candidate_out.shape[1]:
                     candidate_out[a, found] = b
                     list_slave(b, a, k, edge_count_out, edge_slave_out, flag_out)

@@ -6,6 +6,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.edges import SlaveFaces, neighbour
+from warp_mca.kernels.contact.pairs import Pairs, may_meet, spring_of
 from warp_mca.kernels.contact.search import list_slave, root_function, sort_row
 from warp_mca.kernels.contact.spring import Spring
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
@@ -68,6 +69,7 @@ def along_edges_kernel(each: bool, sides: int) -> Any:
         side: wp.array(dtype=wp.int32),
         scene: Index,
         scene_origin: Vector,
+        pairs: Pairs,
         spring: Spring,
         count_out: wp.array(dtype=wp.int32),
         candidate_out: wp.array2d(dtype=wp.int32),
@@ -93,9 +95,10 @@ def along_edges_kernel(each: bool, sides: int) -> Any:
                     f = int(0)
                     query = wp.bvh_query_aabb(bvh, wp.min(x, end), wp.max(x, end), root)
                     while wp.bvh_query_next(query, f):
-                        row = wp.static(sides) * s + side[f]
+                        row = spring_of(pairs, s, f, side[f], wp.static(sides))
                         found = count_out[row]
-                        known = found >= candidate_out.shape[1]  # the list is full: no further faces
+                        # a list that is full takes no further faces
+                        known = found >= candidate_out.shape[1] or not may_meet(pairs, s, f)
                         for c in range(found):
                             known = known or candidate_out[row, c] == f
                         if not known:

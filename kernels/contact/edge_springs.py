@@ -5,7 +5,16 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.contact.edge_pairs import REACH, SLOTS, SkinEdges, crossing, lies_clear, may_begin, share_an_end
+from warp_mca.kernels.contact.edge_pairs import (
+    REACH,
+    SLOTS,
+    SkinEdges,
+    crossing,
+    lies_clear,
+    may_begin,
+    pair_factor,
+    share_an_end,
+)
 from warp_mca.kernels.contact.laws import Laws
 from warp_mca.kernels.contact.search import TOO_DEEP
 from warp_mca.kernels.contact.spring import Spring, open_function, spring_function
@@ -176,9 +185,11 @@ def press_kernel(friction: bool, each: bool, laws: Laws) -> Any:
         b = met.edge[s]
         k = of(scene, a)
         k_old = wp.float64(0.0)
+        factor = wp.float64(1.0)
         if b >= 0:
             before = met.before[s]
-            k_old = wp.min(slave.stiffness[a], master.stiffness[b])
+            factor = pair_factor(slave, master, a, b)
+            k_old = factor * wp.min(slave.stiffness[a], master.stiffness[b])
             if before == s:
                 k_old = spring.stiffness[s]
             elif before >= 0:
@@ -192,7 +203,7 @@ def press_kernel(friction: bool, each: bool, laws: Laws) -> Any:
                     b = int(-1)
         if b >= 0:
             gap = met.gap[s]
-            stiffness = wp.min(k_old, master.stiffness[b])
+            stiffness = wp.min(k_old, factor * master.stiffness[b])
             _, F_n = press(s, gap, met.normal[s], met.du[s], k_old, stiffness, of(mu, k), dt, spring)
             add_normal_force(k, F_n, of(per_newton, k), normal_force_out)
             spring.face[s] = b

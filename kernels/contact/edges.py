@@ -3,6 +3,7 @@
 import warp as wp
 
 from warp_mca.kernels.contact.nearest import Master
+from warp_mca.kernels.contact.pairs import Pairs, pair_factor
 
 
 @wp.struct
@@ -35,12 +36,20 @@ class Surfaces:
         u: displacements [m], shape (node_count,), vec3d.
         master: faces of the master.
         slaves: nodes and faces of the slave.
+        pairs: bodies of a general contact.
     """
 
     X: wp.array(dtype=wp.vec3d)
     u: wp.array(dtype=wp.vec3d)
     master: Master
     slaves: SlaveFaces
+    pairs: Pairs
+
+
+@wp.func
+def greatest_stiffness(at: Surfaces, s: int, f: int) -> wp.float64:
+    """Penalty stiffness of slave node s on face f: the lower one of both [N/m]."""
+    return pair_factor(at.pairs, s, f) * wp.min(at.slaves.stiffness[s], at.master.stiffness[f])
 
 
 @wp.func

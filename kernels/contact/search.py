@@ -11,7 +11,7 @@ from warp_mca.kernels.hardware.per_scene import kind, value_function
 # Entries of the flag array that the host reads with every batch of records.
 FLAGS = OVERFLOW, STALE, TOO_DEEP, TURNED = 0, 1, 2, 3
 
-_EQUAL = 1e-6  # relative difference of distances up to which faces share the nearest point
+EQUAL = 1e-6  # relative difference of distances up to which faces share the nearest point
 
 
 @cache
@@ -229,7 +229,7 @@ def clear_kernel(each: bool, sides: int) -> Any:
             if wp.static(sides > 1):
                 distance = distance_to_face(X, u, face, f, x, at, triangle)
                 closer = distance < nearest
-                if wp.abs(distance - nearest) <= wp.float64(_EQUAL) * nearest:
+                if wp.abs(distance - nearest) <= wp.float64(EQUAL) * nearest:
                     closer = depth > plane or (depth == plane and gap >= wp.float64(0.0))
             if inside and closer:
                 nearest = distance

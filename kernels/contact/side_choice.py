@@ -78,13 +78,13 @@ def first_choice(node: NodeSprings) -> Choice:
 
 @cache
 def springs_function(friction: bool, sides: int) -> Any:
-    """The function that gathers what the springs of slave node s hold."""
+    """The function that gathers what the springs of a slave node hold, from `begin` on."""
     pressure = pressure_function(friction)
 
     @wp.func
-    def springs_of_node(s: int, count: wp.array(dtype=wp.int32), spring: Spring) -> NodeSprings:
+    def springs_of_node(begin: int, count: wp.array(dtype=wp.int32), spring: Spring) -> NodeSprings:
         node = NodeSprings()
-        node.begin = wp.static(sides) * s
+        node.begin = begin
         node.last_listed = -1
         for e in range(node.begin, node.begin + wp.static(sides)):
             held = spring.held[e]

@@ -7,6 +7,7 @@ import warp as wp
 
 from warp_mca.kernels.contact.edges import Surfaces, area_vector, lies_below, opposition
 from warp_mca.kernels.contact.nearest import Nearest, edge_of, nearest_face, passes_by, reachable
+from warp_mca.kernels.contact.pairs import same_solid
 from warp_mca.kernels.contact.side_choice import NodeSprings
 from warp_mca.kernels.contact.spring import FAR
 from warp_mca.kernels.contact.way_back import OPPOSES, slides_at, usual_depth
@@ -24,7 +25,7 @@ def belongs_to_other_side(
     """Whether slave node s meets face `other`, at `gap` in front of it, not the nearest face across an edge."""
     across = area_vector(at.X, at.u, at.master.face, other)
     found = bool(False)
-    if lies_below(at.X, at.u, at.master.face, near.face, other, across):
+    if same_solid(at.pairs, near.face, other) and lies_below(at.X, at.u, at.master.face, near.face, other, across):
         mine = opposition(at, s, near.normal)
         its = opposition(at, s, across)
         if mine < wp.float64(OPPOSES) or (near.beside and mine < its + wp.float64(OPPOSES)):

@@ -11,7 +11,7 @@ import warp as wp
 
 from warp_mca.kernels.contact.contact import BLOCK_DIM
 from warp_mca.kernels.contact.edge_rest import release_function
-from warp_mca.kernels.contact.edges import Surfaces
+from warp_mca.kernels.contact.edges import Surfaces, greatest_stiffness
 from warp_mca.kernels.contact.laws import PLAIN, Laws
 from warp_mca.kernels.contact.nearest import nearest_face
 from warp_mca.kernels.contact.search import STALE, moved_too_far
@@ -29,13 +29,13 @@ from warp_mca.kernels.hardware.per_scene import kind, value_function
 
 
 @cache
-def sided_kernel(friction: bool, each: bool, sides: int, laws: Laws = PLAIN) -> Any:
+def sided_kernel(friction: bool, each: bool, sides: int, laws: Laws = PLAIN, slots: int = 1) -> Any:
     """Kernel: as `kernels.contact.contact.surface_kernel`, for a master with several sides.
 
     Springs and lists are ordered by slave, then by side. A node that no side presses goes to the side behind which it
     was least deep before the step; ties go to the side with the greatest approach speed. It may be as deep there as in
     the side that released it, because it may have slid over an edge. If several sides have candidates, step 0 chooses
-    among them; step 1 presses the node.
+    among them; step 1 presses the node. Each of the `slots` bodies that a node may touch at once has its own springs.
     """
     settle, _ = settle_functions(friction, True, laws)
     choose, confirm = choice_functions(sides)
@@ -66,34 +66,39 @@ def sided_kernel(friction: bool, each: bool, sides: int, laws: Laws = PLAIN) -> 
         s = first + wp.tid()
         i, k = at.slaves.node[s], of(scene, s)
         x = at.X[i] + at.u[i]
-        node = springs_of_node(s, at.master.count, spring)
-        along = wp.vec3f(node.pressed)
-        fronts, front_face, front = front_faces(at, node, x, along)
-        choice, total, scale = first_choice(node), wp.vec3d(), of(per_newton, k)
-        for step in range(wp.where(node.listed > 1, 0, wp.where(node.active, 1, 2)), 2):
-            for e in range(node.begin, node.begin + wp.static(sides)):
-                near = nearest_face(at.X, at.u, at.master, e, x, along)
-                ends = way_ends(near, node.holding and spring.face[e] < 0)
-                front = wp.min(front, near.front)
-                near.front = front  # of every side so far
-                held, pressed = spring.held[e], spring.face[e] >= 0
-                if near.face >= 0:
-                    touch = meet(v, at.master.face, i, near, dt, held, wp.vec3f(pressure(e, spring)))
-                    touches = may_press(at, s, near, held, pressed, touch.du, node, fronts, front_face, recent_out)
-                    if step == 0:
-                        choice = choose(at, s, e, near, touch, touches, along, node, choice, spring, recent_out)
-                    else:
-                        touch = confirm(at, e, near, touch, touches, node, choice, spring)
-                        touch.own = at.slaves.stiffness[s]
-                        touch.limit = at.master.stiffness[near.face]
-                        total += settle(e, k, near, touch, of(mu, k), scale, spring, normal_force_out, flag_out)
-                        note_way(e, touch.touches, ends, spring)
-                elif step == 1:
-                    total += release(
-                        at, v, s, e, k, near, node, choice.newcomer, ends, fronts, front_face, along,
-                        of(mu, k), scale, dt, spring, normal_force_out, recent_out, flag_out
-                    )  # fmt: skip
-        if node.active:
+        total, scale = wp.vec3d(), of(per_newton, k)
+        active = bool(False)
+        each_body = wp.static(sides * slots)
+        for begin in range(each_body * s, each_body * (s + 1), wp.static(sides)):
+            node = springs_of_node(begin, at.master.count, spring)
+            along = wp.vec3f(node.pressed)
+            fronts, front_face, front = front_faces(at, node, x, along)
+            choice = first_choice(node)
+            active = active or node.active
+            for step in range(wp.where(node.listed > 1, 0, wp.where(node.active, 1, 2)), 2):
+                for e in range(node.begin, node.begin + wp.static(sides)):
+                    near = nearest_face(at.X, at.u, at.master, e, x, along)
+                    ends = way_ends(near, node.holding and spring.face[e] < 0)
+                    front = wp.min(front, near.front)
+                    near.front = front  # of every side so far
+                    held, pressed = spring.held[e], spring.face[e] >= 0
+                    if near.face >= 0:
+                        touch = meet(v, at.master.face, i, near, dt, held, wp.vec3f(pressure(e, spring)))
+                        touches = may_press(at, s, near, held, pressed, touch.du, node, fronts, front_face, recent_out)
+                        if step == 0:
+                            choice = choose(at, s, e, near, touch, touches, along, node, choice, spring, recent_out)
+                        else:
+                            touch = confirm(at, e, near, touch, touches, node, choice, spring)
+                            touch.own = greatest_stiffness(at, s, near.face)
+                            touch.limit = touch.own
+                            total += settle(e, k, near, touch, of(mu, k), scale, spring, normal_force_out, flag_out)
+                            note_way(e, touch.touches, ends, spring)
+                    elif step == 1:
+                        total += release(
+                            at, v, s, e, k, near, node, choice.newcomer, ends, fronts, front_face, along,
+                            of(mu, k), scale, dt, spring, normal_force_out, recent_out, flag_out
+                        )  # fmt: skip
+        if active:
             nodal_force_out[i] = nodal_force_out[i] + total
             recent_out[i] = recent(recent_out[i], total)
         if moved_too_far(at.u[i], u_search[i], of(margin, k)):

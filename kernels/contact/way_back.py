@@ -5,8 +5,9 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.contact.edges import Surfaces, is_on_rim, lies_below, opposition
+from warp_mca.kernels.contact.edges import Surfaces, greatest_stiffness, is_on_rim, lies_below, opposition
 from warp_mca.kernels.contact.nearest import ABOVE, SLACK, Nearest, edge_of, nearest_face
+from warp_mca.kernels.contact.pairs import same_solid
 from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring
 
 OPPOSES = 0.5  # difference of cosines by which the faces of a slave clearly oppose one side more than another
@@ -65,7 +66,7 @@ def usual_depth(
     force = along_normal(recent_force[at.slaves.node[s]], normal)
     for c in range(4):
         force = wp.max(force, along_normal(-recent_force[at.master.face[face, c]], normal))
-    return force / wp.min(at.slaves.stiffness[s], at.master.stiffness[face])
+    return force / greatest_stiffness(at, s, face)
 
 
 @wp.func
@@ -122,7 +123,7 @@ def way_back_function(sides: int) -> Any:
         for q in range(begin, begin + wp.static(sides)):
             if q != e and spring.held[e] < wp.float64(ANY_DEPTH):
                 home = nearest_face(at.X, at.u, at.master, q, at.X[i] + at.u[i], along)
-                if home.face >= 0 and not home.beside:
+                if home.face >= 0 and not home.beside and same_solid(at.pairs, near.face, wp.max(home.face, 0)):
                     if lies_below(at.X, at.u, at.master.face, near.face, home.face, home.normal):
                         usual = usual_depth(at, s, home.face, home.normal, recent_force)
                         left = spring.left[q]

@@ -182,12 +182,13 @@ def texts(owner: str, /, **values: str) -> None:
             raise bad_value(f"{owner}.{name}", value, "give a text that UTF-8 can encode")
 
 
-def members(owner: str, kind: type, /, **values: Sequence[object]) -> None:
+def members(owner: str, kind: type | tuple[type, ...], /, **values: Sequence[object]) -> None:
     """Each value must be a tuple or list of instances of `kind`."""
+    kinds_named = " or a ".join(one.__name__ for one in (kind if isinstance(kind, tuple) else (kind,)))
     for name, value in values.items():
-        kind_of(f"{owner}.{name}", value, (tuple, list), f"give a tuple of {kind.__name__}")
+        kind_of(f"{owner}.{name}", value, (tuple, list), f"give a tuple of {kinds_named}")
         for k, item in enumerate(value):
-            kind_of(f"{owner}.{name}[{k}]", item, kind, f"give a {kind.__name__}")
+            kind_of(f"{owner}.{name}[{k}]", item, kind, f"give a {kinds_named}")
 
 
 def kind_of(field: str, value: object, kind: type | tuple[type, ...], remedy: str) -> None:

@@ -18,15 +18,17 @@ from warp_mca.model.viscosity import share_of_step, with_viscosity
 from warp_mca.physics.absorbing.nodes import absorbing_nodes
 from warp_mca.physics.contact.auto_penalty import ChosenPenalty, settled
 from warp_mca.physics.contact.axes import contact_axes
+from warp_mca.physics.contact.eigenvalues import contact_eigenvalues
+from warp_mca.physics.contact.general import general_passes
 from warp_mca.physics.contact.skin_edges import edge_eigenvalues, edge_pass
-from warp_mca.physics.contact.surfaces import ContactPass, contact_eigenvalues, contact_passes, is_two_way
+from warp_mca.physics.contact.surfaces import ContactPass, contact_passes, is_two_way
 from warp_mca.physics.joints.constraints import check_bindings, constraints, free_nodes, join_bodies, nodes_of
 from warp_mca.physics.loads.joint_loads import hinge_loads, movable_bases
 from warp_mca.physics.loads.nodal import loaded_nodes
 from warp_mca.physics.rigid.bodies import RigidBody, check_loads, flexible, own_nodes, rigid_bodies
 from warp_mca.physics.rigid.stable_step import bounce_factor, stable_with_rigid
 from warp_mca.physics.ties.nodes import check_ties, on_faces, tied_nodes, velocities
-from warp_mca.scene import RigidPlane, Scene
+from warp_mca.scene import ContactAll, RigidPlane, Scene
 
 if TYPE_CHECKING:
     from warp_mca.rigid.chain import Chain
@@ -44,6 +46,13 @@ def _contacts(
     axes = np.zeros((len(parts.scene.contacts), 2, 3))
     added = np.zeros(len(parts.X))
     for index, contact in enumerate(parts.scene.contacts):
+        if isinstance(contact, ContactAll):
+            found, value = general_passes(parts, contact, index)
+            added += value
+            decay = found[0].damping * float(value.max()) / found[0].stiffening if found[0].damping else 0.0
+            passes += [replace(item, penalty_given=contact.penalty is not None, decay=decay) for item in found]
+            penalties.append(None)
+            continue
         slave = parts.faces(contact.slave)
         master = None if isinstance(contact.master, RigidPlane) else parts.faces(contact.master)
         contact = replace(contact, two_way=is_two_way(contact, slave, master))

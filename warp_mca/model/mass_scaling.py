@@ -166,7 +166,7 @@ def striking_body(scene: Scene, shares: Mapping[str, float]) -> str:
     """The link that strikes; without a rigid phase, of the bodies in contact, or of all, the one that gained most."""
     if scene.rigid is not None:
         return scene.rigid.tip.body
-    sides = [side for item in scene.contacts for side in (item.slave, item.master)]
+    sides = [side for pair in scene.surface_pairs() for side in pair]
     names = {side.body for side in sides if isinstance(side, Surface)} or set(shares)
     return max(sorted(names), key=lambda name: shares[name])
 

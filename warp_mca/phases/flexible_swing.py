@@ -22,7 +22,7 @@ from warp_mca.phases.checkpoint import damage_explained
 from warp_mca.phases.division import coarser
 from warp_mca.phases.stretch import Stretch, stretch_ended
 from warp_mca.rigid.placement import link_placements
-from warp_mca.scene import RigidPlane, Scene
+from warp_mca.scene import ContactAll, RigidPlane, Scene
 from warp_mca.step.state_figures import joint_impulses
 
 if TYPE_CHECKING:
@@ -180,5 +180,6 @@ class FlexibleSwing:
 def _is_of_link(scene: Scene, contact: int, links: list[str]) -> bool:
     """Whether a contact is of a link with something that is none."""
     item = scene.contacts[contact]
-    other = None if isinstance(item.master, RigidPlane) else item.master.body
-    return (item.slave.body in links) != (other in links)
+    if isinstance(item, ContactAll):
+        return any((one in links) != (other in links) for one, other in scene.general_pairs())
+    return (item.slave.body in links) != (not isinstance(item.master, RigidPlane) and item.master.body in links)

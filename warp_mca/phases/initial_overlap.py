@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.geometry.cell_types import triangulated
 from warp_mca.results.contact_history import contact_names
-from warp_mca.scene import OVERLAP_CHOICES, RigidPlane
+from warp_mca.scene import OVERLAP_CHOICES, Contact, RigidPlane, Surface
 from warp_mca.watch.skins import depths_below
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
     from warp_mca.phases.prepare import Prepared
     from warp_mca.physics.contact.stage import ContactStage
-    from warp_mca.scene import Contact
+    from warp_mca.physics.contact.surfaces import ContactPass
     from warp_mca.step.solver import Solver
     from warp_mca.step.state import State
 
@@ -112,29 +112,49 @@ def _or_behind(
     found: Overlap, nodes: NDArray[np.int32], ready: Prepared, stage: ContactStage, scene: int, solver: Solver
 ) -> Overlap:
     """What was found, named "behind" if none of the pressed nodes lies in the master's body."""
-    contact, sign = ready.scene.contacts[stage.items[scene].contact], stage.items[scene].sign
-    assert not isinstance(contact.master, RigidPlane)
-    name = contact.master.body if sign > 0.0 else contact.slave.body
-    first = int(solver.layout.nodes[scene]) + ready.model.node_start[name]
-    mesh = ready.meshes[name]
-    body = solver.model.X[first : first + len(mesh.points)]
-    inside = depths_below(solver.model.X[np.unique(nodes)], body, triangulated(mesh.boundary[0]))
-    return found if (inside > -_rounding(stage, scene, solver)).any() else replace(found, kind="behind")
+    points = solver.model.X[np.unique(nodes)]
+    for name in {master.body for _, master in _surfaces(ready, stage.items[scene])}:
+        first = int(solver.layout.nodes[scene]) + ready.model.node_start[name]
+        mesh = ready.meshes[name]
+        body = solver.model.X[first : first + len(mesh.points)]
+        inside = depths_below(points, body, triangulated(mesh.boundary[0]))
+        if (inside > -_rounding(stage, scene, solver)).any():
+            return found
+    return replace(found, kind="behind")
+
+
+def _surfaces(ready: Prepared, item: ContactPass) -> list[tuple[Surface, Surface]]:
+    """Slaves and masters of different bodies in a pass that has no plane."""
+    contact = ready.scene.contacts[item.contact]
+    if isinstance(contact, Contact):
+        assert not isinstance(contact.master, RigidPlane)
+        return [(contact.slave, contact.master) if item.sign > 0.0 else (contact.master, contact.slave)]
+    skins = {body.name: Surface(body=body.name, nodes="boundary") for body in ready.scene.bodies}
+    pairs = [pair for pair in ready.scene.general_pairs() if pair[0] != pair[1]]
+    return [(skins[a], skins[b]) for one, other in pairs for a, b in ((one, other), (other, one))]
 
 
 def _deep_overlap(ready: Prepared, stage: ContactStage, scene: int, solver: Solver) -> Overlap | None:
     """Slave nodes that lie inside the master's body too deep for its faces to reach them, if there are any."""
     if stage.on_plane:
         return None
+    found = (_deep_in(ready, stage, scene, solver, *pair) for pair in _surfaces(ready, stage.items[scene]))
+    return next((overlap for overlap in found if overlap), None)
+
+
+def _deep_in(
+    ready: Prepared, stage: ContactStage, scene: int, solver: Solver, slave: Surface, master: Surface
+) -> Overlap | None:
+    """`_deep_overlap` of two surfaces."""
     item, model = stage.items[scene], ready.model
-    contact = ready.scene.contacts[item.contact]
-    assert not isinstance(contact.master, RigidPlane)
-    master, slave = (contact.master, contact.slave) if item.sign > 0.0 else (contact.slave, contact.master)
     mesh, start = ready.meshes[master.body], model.node_start[master.body]
     first = int(solver.layout.nodes[scene])
     X = solver.model.X[first:]
     body = X[start : start + len(mesh.points)]
     own = item.slave - first if len(stage.items) > 1 else item.slave
+    if item.pairs:  # of which the slave's are some
+        begin = model.node_start[slave.body]
+        own = own[(own >= begin) & (own < begin + len(ready.meshes[slave.body].points))]
     near = own[_in_box(X[own], body)]
     found = None
     if len(near):
@@ -175,7 +195,7 @@ def _in_box(points: Array, body: Array) -> NDArray[np.bool_]:
 
 
 def _refusal(ready: Sequence[Prepared], scene: int, contact: int, found: Overlap, at: Array) -> RequestError:
-    item: Contact = ready[scene].scene.contacts[contact]
+    item = ready[scene].scene.contacts[contact]
     field = f"Contact {contact_names(ready[scene].scene.contacts)[contact]}: initial_overlap"
     others = ", ".join(repr(choice) for choice in OVERLAP_CHOICES[1:])
     place = f"({found.count} of them, up to {found.depth:.3g} m deep at ({at[0]:.4g}, {at[1]:.4g}, {at[2]:.4g}) m)"

@@ -182,10 +182,10 @@ class Setup:
     def slaves(self) -> dict[str, NDArray[np.int32]]:
         """Nodes of each link that a contact keeps out of the target."""
         target, found = self.rigid.target, {}
-        for contact in self.scene.contacts:
-            sides = [(contact.slave, contact.master)]
-            if isinstance(contact.master, Surface):
-                sides.append((contact.master, contact.slave))
+        for slave, master in self.scene.surface_pairs():
+            sides = [(slave, master)]
+            if isinstance(master, Surface):
+                sides.append((master, slave))
             for own, other in sides:
                 meets = other == target or (
                     isinstance(other, Surface) and isinstance(target, Surface) and other.body == target.body

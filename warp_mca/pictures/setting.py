@@ -84,7 +84,7 @@ class PlaneMesh:
 def rigid_planes(scene: Scene) -> list[RigidPlane]:
     """The rigid planes of a scene's contacts, each once."""
     found: list[RigidPlane] = []
-    for contact in scene.contacts:
+    for contact in scene.listed:
         if isinstance(contact.master, RigidPlane) and contact.master not in found:
             found.append(contact.master)
     return found

@@ -100,7 +100,7 @@ class RunInfo:
     @property
     def striking(self) -> list[str]:
         """Bodies that are not only struck, as a plate is that is much larger than what strikes it."""
-        struck = {c.master.body for c in self.scene.contacts if not isinstance(c.master, RigidPlane)}
+        struck = {c.master.body for c in self.scene.listed if not isinstance(c.master, RigidPlane)}
         return [body for body in self.surfaces if body not in struck] or list(self.surfaces)
 
 

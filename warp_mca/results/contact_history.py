@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from warp_mca.results.force_history import contact_intervals, unfinished
 from warp_mca.results.npz import load_histories, save_histories
-from warp_mca.scene import Contact, RigidPlane
+from warp_mca.scene import Contact, ContactAll
 
 Array = NDArray[np.float64]
 
@@ -29,6 +29,8 @@ _COLUMNS = {  # arrays of forces.npz, and the attributes of `ContactHistory` tha
 @dataclass(frozen=True, kw_only=True)
 class ContactHistory:
     """One contact of the scene in every output interval. Forces act on the slave; those of both passes count.
+
+    A general contact has only `pressure` and `closing_speed`: its forces on all bodies add up to zero.
 
     Attributes:
         name: of the contact, see `contact_names`.
@@ -95,15 +97,17 @@ class ContactHistory:
         }
 
 
-def contact_names(contacts: Sequence[Contact]) -> tuple[str, ...]:
-    """A name for each contact: its own, or "slave–master" by their bodies, numbered from the second of a pair on."""
+def contact_names(contacts: Sequence[Contact | ContactAll]) -> tuple[str, ...]:
+    """A name for each contact: its own, or "slave–master" by their bodies, numbered from the second of a pair on.
+
+    That of a general contact is "all".
+    """
     taken = {contact.name for contact in contacts if contact.name is not None}
     names: list[str] = []
     for contact in contacts:
         name = contact.name
         if name is None:
-            master = "plane" if isinstance(contact.master, RigidPlane) else contact.master.body
-            pair = f"{contact.slave.body}–{master}"
+            pair = "all" if isinstance(contact, ContactAll) else "–".join(contact.sides)
             numbered = (pair if k == 1 else f"{pair} {k}" for k in range(1, len(contacts) + 1))
             name = next(text for text in numbered if text not in taken)
             taken.add(name)

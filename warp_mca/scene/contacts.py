@@ -52,8 +52,52 @@ class RigidPlane:
             raise bad_value("RigidPlane.velocity", self.velocity, "it must be perpendicular to the normal")
 
 
+class _Springs:
+    """What the springs of a contact have, whichever surfaces they keep apart; `Contact` describes it."""
+
+    mu: float
+    penalty: float | Literal["auto"] | None
+    initial_overlap: Literal["refuse", "stress_free", "press"]
+    name: str | None
+    law: ContactLaw
+    friction: FrictionLaw | tuple[FrictionLaw, ...]
+
+    def _check_springs(self) -> None:
+        owner = type(self).__name__
+        validate.plain(self)
+        if type(self.law) not in CONTACT_LAWS.values():  # others are not registered
+            remedy = f"give a {' or a '.join(CONTACT_LAWS)}; register other classes by warp_mca.register"
+            raise bad_value(f"{owner}.law", validate.brief(self.law), remedy)
+        if isinstance(self.penalty, str):
+            if self.penalty != "auto":
+                raise bad_value(f"{owner}.penalty", self.penalty, "give a finite number above 0, auto or None")
+        elif self.penalty is not None:
+            validate.positive(owner, penalty=self.penalty)
+        if self.initial_overlap not in OVERLAP_CHOICES:
+            raise bad_value(f"{owner}.initial_overlap", self.initial_overlap, f"choose {' or '.join(OVERLAP_CHOICES)}")
+        if not (validate.is_number(self.mu) and 0.0 <= self.mu <= MOST_FRICTION):
+            remedy = f"give a coefficient of friction from 0 to {MOST_FRICTION:g}"
+            raise bad_value(f"{owner}.mu", self.mu, remedy)
+        for law in self.friction_laws:
+            if type(law) not in FRICTION_LAWS.values():  # others are not registered
+                remedy = f"give a {' or a '.join(FRICTION_LAWS)}; register other classes by warp_mca.register"
+                raise bad_value(f"{owner}.friction", validate.brief(law), remedy)
+            if self.mu == 0.0:
+                raise bad_value(
+                    f"{owner}.mu", self.mu, "give the coefficient at rest, above 0, for the law of friction"
+                )
+            law.check(self.mu)
+        if self.name is not None:
+            validate.texts(owner, name=self.name)
+
+    @property
+    def friction_laws(self) -> tuple[FrictionLaw, ...]:
+        """The laws of `friction`, also where it is a single one."""
+        return self.friction if isinstance(self.friction, tuple) else (self.friction,)
+
+
 @dataclass(frozen=True, kw_only=True)
-class Contact:
+class Contact(_Springs):
     """Node-to-surface penalty contact with stick-slip friction.
 
     Attributes:
@@ -92,44 +136,63 @@ class Contact:
     friction: FrictionLaw | tuple[FrictionLaw, ...] = ()
 
     def __post_init__(self) -> None:
-        validate.plain(self)
+        self._check_springs()
         validate.kinds("Contact", Surface, "give a Surface", slave=self.slave)
         validate.kinds("Contact", (Surface, RigidPlane), "give a Surface or a RigidPlane", master=self.master)
-        if type(self.law) not in CONTACT_LAWS.values():  # others are not registered
-            remedy = f"give a {' or a '.join(CONTACT_LAWS)}; register other classes by warp_mca.register"
-            raise bad_value("Contact.law", validate.brief(self.law), remedy)
-        if isinstance(self.penalty, str):
-            if self.penalty != "auto":
-                raise bad_value("Contact.penalty", self.penalty, "give a finite number above 0, auto or None")
-        elif self.penalty is not None:
-            validate.positive("Contact", penalty=self.penalty)
-        if self.initial_overlap not in OVERLAP_CHOICES:
-            raise bad_value("Contact.initial_overlap", self.initial_overlap, f"choose {' or '.join(OVERLAP_CHOICES)}")
-        if not (validate.is_number(self.mu) and 0.0 <= self.mu <= MOST_FRICTION):
-            remedy = f"give a coefficient of friction from 0 to {MOST_FRICTION:g}"
-            raise bad_value("Contact.mu", self.mu, remedy)
-        self._check_friction()
         if self.two_way is not None:
             validate.flags("Contact", two_way=self.two_way)
         if self.two_way and isinstance(self.master, RigidPlane):
             raise bad_value("Contact.two_way", self.two_way, "a rigid plane has no nodes; leave two_way off")
         if isinstance(self.master, Surface) and self.master.body == self.slave.body:
-            raise bad_value("Contact.master.body", self.master.body, "name a body other than the slave's")
-        if self.name is not None:
-            validate.texts("Contact", name=self.name)
+            remedy = "name a body other than the slave's; ContactAll keeps a body out of itself"
+            raise bad_value("Contact.master.body", self.master.body, remedy)
         axes = {"normal": self.normal, "tangent": self.tangent}
         validate.directions("Contact", **{name: axis for name, axis in axes.items() if axis is not None})
 
     @property
-    def friction_laws(self) -> tuple[FrictionLaw, ...]:
-        """The laws of `friction`, also where it is a single one."""
-        return self.friction if isinstance(self.friction, tuple) else (self.friction,)
+    def sides(self) -> tuple[str, str]:
+        """What it keeps apart: the slave's body and the master's, or "plane"."""
+        return self.slave.body, self.master.body if isinstance(self.master, Surface) else "plane"
 
-    def _check_friction(self) -> None:
-        for law in self.friction_laws:
-            if type(law) not in FRICTION_LAWS.values():  # others are not registered
-                remedy = f"give a {' or a '.join(FRICTION_LAWS)}; register other classes by warp_mca.register"
-                raise bad_value("Contact.friction", validate.brief(law), remedy)
-            if self.mu == 0.0:
-                raise bad_value("Contact.mu", self.mu, "give the coefficient at rest, above 0, for the law of friction")
-            law.check(self.mu)
+
+@dataclass(frozen=True, kw_only=True)
+class ContactAll(_Springs):
+    """General contact: the skin of each body against those of all others and against itself, in both directions.
+
+    Pairs with a listed `Contact` are left to that, which so gives a pair its own friction and stiffness. Bodies that a
+    joint or a tie connects are left out, because they may overlap there, and so are pairs of two rigid bodies: list a
+    `Contact` where these shall meet. Rigid planes are always listed.
+
+    Attributes:
+        mu, law, friction, initial_overlap: as in `Contact`, for all pairs.
+        penalty: as in `Contact`, though not "auto".
+        exclude: pairs of bodies that are not kept apart; a body paired with itself has no self-contact.
+        self_contact: whether bodies are kept out of themselves; rigid ones cannot fold.
+        name: unique in the scene; None for "all". Its force is the sum of the sizes of the normal forces of all pairs.
+    """
+
+    exclude: tuple[tuple[str, str], ...] = ()
+    self_contact: bool = True
+    mu: float = 0.0
+    penalty: float | Literal["auto"] | None = None
+    initial_overlap: Literal["refuse", "stress_free", "press"] = "refuse"
+    name: str | None = None
+    law: ContactLaw = field(default_factory=Penalty)
+    friction: FrictionLaw | tuple[FrictionLaw, ...] = ()
+
+    def __post_init__(self) -> None:
+        self._check_springs()
+        if self.penalty == "auto":
+            raise bad_value("ContactAll.penalty", self.penalty, "it is chosen pair by pair; list the pair as a Contact")
+        validate.flags("ContactAll", self_contact=self.self_contact)
+        remedy = 'give pairs of bodies, as [("a", "b")]'
+        validate.kind_of("ContactAll.exclude", self.exclude, (tuple, list), remedy)
+        for pair in self.exclude:
+            if not (isinstance(pair, (tuple, list)) and len(pair) == 2 and all(isinstance(name, str) for name in pair)):
+                raise bad_value("ContactAll.exclude", validate.brief(pair), remedy)
+        object.__setattr__(self, "exclude", tuple((one, other) for one, other in self.exclude))
+
+    @property
+    def two_way(self) -> bool:
+        """Always: either direction has half the stiffness."""
+        return True

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from itertools import combinations_with_replacement
 from types import NoneType
 
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.scene.absorbing import Absorbing
 from warp_mca.scene.bodies import Body, Vec3
-from warp_mca.scene.contacts import Contact, Surface
+from warp_mca.scene.contacts import Contact, ContactAll, RigidPlane, Surface
 from warp_mca.scene.drives import Fixed, Prescribed
 from warp_mca.scene.joints import JOINTS, Joint, Prismatic, Weld
 from warp_mca.scene.loads import LOADS, Load
@@ -21,7 +22,7 @@ from warp_mca.scene.tied_surfaces import Tie
 
 _PARTS = {
     "bodies": Body,
-    "contacts": Contact,
+    "contacts": (Contact, ContactAll),
     "ties": Tie,
     "fixed": Fixed,
     "prescribed": Prescribed,
@@ -46,7 +47,7 @@ class Scene:
         t_end: the run goes through as many swings and impacts as occur until then, counted from the release [s]; None
             for one impact.
         phases: of finite elements that come before the impact, in their order, as `(Settle(),)`.
-        joints, contacts, fixed, prescribed, ties: what binds the bodies.
+        joints, contacts, fixed, prescribed, ties: what binds the bodies; contacts="all" stands for (ContactAll(),).
         absorbing: sides of bodies through which waves leave.
         loads: forces on nodes in the impact phase, of the kinds in `scene.loads.LOADS`.
         gravity: [m/s^2].
@@ -69,7 +70,7 @@ class Scene:
     t_end: float | None = None
     phases: tuple[object, ...] = ()
     joints: tuple[Joint, ...] = ()
-    contacts: tuple[Contact, ...] = ()
+    contacts: tuple[Contact | ContactAll, ...] = ()
     fixed: tuple[Fixed, ...] = ()
     prescribed: tuple[Prescribed, ...] = ()
     absorbing: tuple[Absorbing, ...] = ()
@@ -86,6 +87,10 @@ class Scene:
     parameters: Mapping[str, object] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        if isinstance(self.contacts, str):
+            if self.contacts != "all":
+                raise bad_value("Scene.contacts", self.contacts, 'give contacts, or "all" for general contact')
+            object.__setattr__(self, "contacts", (ContactAll(),))
         validate.plain(self)
         validate.texts("Scene", name=self.name)
         for name, kind in _PARTS.items():
@@ -113,7 +118,9 @@ class Scene:
         if shared := sorted(set(sensors) & set(contacts)):
             raise bad_value("Scene.probes", shared, "contacts have these names too, and columns of tables; rename them")
         validate.unique("Scene.joints", [joint.name for joint in self.joints], "joint")
-        pairs = [(item.slave, item.master) for item in self.contacts]
+        if len(self.contacts) > len(self.listed) + 1:
+            raise bad_value("Scene.contacts", "ContactAll", "give one, and list pairs that differ from it as Contacts")
+        pairs = [(item.slave, item.master) for item in self.listed]
         for slave, master in pairs:
             if pairs.count((slave, master)) > 1:
                 what = f"{slave.nodes} of {slave.body}"
@@ -124,6 +131,9 @@ class Scene:
         for field_name, body in self._named_bodies():
             if body not in names:
                 raise bad_value(field_name, body, f"the scene's bodies are {', '.join(names)}")
+        if self.general and not self.general_pairs():
+            remedy = "no pair is left to it: bodies are listed, bound to each other, excluded or rigid; leave it out"
+            raise bad_value("Scene.contacts", "ContactAll", remedy)
         for probe in self.probes:
             if probe.cfc is not None:
                 check_class(f"{probe.title}.cfc", probe.cfc, self.impact.output_interval)
@@ -186,8 +196,8 @@ class Scene:
 
     def _surfaces(self) -> list[tuple[str, Surface]]:
         """Surfaces that the scene names, each with the field."""
-        named: list[tuple[str, object]] = [("Contact.slave", item.slave) for item in self.contacts]
-        named += [("Contact.master", item.master) for item in self.contacts]
+        named: list[tuple[str, object]] = [("Contact.slave", item.slave) for item in self.listed]
+        named += [("Contact.master", item.master) for item in self.listed]
         named += [(f"{tie.title}.{name}", getattr(tie, name)) for tie in self.ties for name in ("slave", "master")]
         named += [("RigidPhase.target", self.rigid.target)] if self.rigid else []
         return [(field, surface) for field, surface in named if isinstance(surface, Surface)]
@@ -198,6 +208,8 @@ class Scene:
         named += [(f"{item.title}.body", item.body) for item in self.joints]
         named += [(f"{item.title}.other", item.other) for item in self.joints if item.other is not None]
         named += [(f"{field}.body", surface.body) for field, surface in self._surfaces()]
+        excluded = self.general.exclude if self.general else ()
+        named += [("ContactAll.exclude", name) for pair in excluded for name in pair]
         named += [(f"Path {path.name}.body", line.body) for path in self.paths for line in path.lines]
         named += [(f"{item.title}.body", item.body) for item in (*self.probes, *self.sections)]
         named += [(f"Scene.{key}.body", p.body) for key, p in (("tip", self.tip), ("target", self.target)) if p]
@@ -218,6 +230,40 @@ class Scene:
                     named.append((f"{joint.title}.other_nodes", joint.other, joint.other_nodes, False))
         named += [(f"{field}.nodes", surface.body, surface.nodes, True) for field, surface in self._surfaces()]
         return named + [(f"{p.title}.nodes", p.body, p.nodes, False) for p in self.probes if p.nodes is not None]
+
+    @property
+    def listed(self) -> tuple[Contact, ...]:
+        """The contacts of two listed surfaces."""
+        return tuple(item for item in self.contacts if isinstance(item, Contact))
+
+    @property
+    def general(self) -> ContactAll | None:
+        """The general contact."""
+        return next((item for item in self.contacts if isinstance(item, ContactAll)), None)
+
+    def general_pairs(self) -> list[tuple[str, str]]:
+        """Pairs of bodies that the general contact keeps apart, bodies with themselves too, each pair once.
+
+        Not those that are excluded, listed, bound by a joint or a tie, or both rigid.
+        """
+        if self.general is None:
+            return []
+        out = {frozenset(pair) for pair in self.general.exclude} | {
+            frozenset(item.sides) for item in self.listed if isinstance(item.master, Surface)
+        }
+        out |= {frozenset((joint.body, joint.other)) for joint in self.joints if joint.other is not None}
+        out |= {frozenset((tie.slave.body, tie.master.body)) for tie in self.ties}
+        out |= {frozenset(pair) for pair in combinations_with_replacement(self.rigid_names, 2)}
+        if not self.general.self_contact:
+            out |= {frozenset((body.name,)) for body in self.bodies}
+        pairs = combinations_with_replacement([body.name for body in self.bodies], 2)
+        return [pair for pair in pairs if frozenset(pair) not in out]
+
+    def surface_pairs(self) -> list[tuple[Surface, Surface | RigidPlane]]:
+        """Surfaces of different bodies, or planes, that the contacts keep apart; those of the general one are skins."""
+        skins = {body.name: Surface(body=body.name, nodes="boundary") for body in self.bodies}
+        found: list[tuple[Surface, Surface | RigidPlane]] = [(item.slave, item.master) for item in self.listed]
+        return found + [(skins[one], skins[other]) for one, other in self.general_pairs() if one != other]
 
     @property
     def rigid_names(self) -> list[str]:

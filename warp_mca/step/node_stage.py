@@ -11,7 +11,7 @@ import warp as wp
 from warp_mca.kernels.nodes import constraint, node, slide
 from warp_mca.kernels.nodes.gather import Kind, NodeData, NodeState
 from warp_mca.physics.actor import Actor, When
-from warp_mca.physics.contact.stage import per_scene
+from warp_mca.physics.contact.per_scene import per_scene
 from warp_mca.physics.elements.stage import BLOCK_DIM
 from warp_mca.physics.loads.weight import nodal_gravity
 from warp_mca.step.stage import Stage, Step

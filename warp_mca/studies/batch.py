@@ -19,7 +19,7 @@ from warp_mca.phases.settings import settings_of
 from warp_mca.phases.simulate import simulate
 from warp_mca.results.result import Result
 from warp_mca.results.storage import ALL_FILES, check_output, folder_path, save
-from warp_mca.scene import RigidPlane, Scene
+from warp_mca.scene import Scene
 from warp_mca.scene.options import with_options
 
 Meshes = Mapping[str, Mesh]
@@ -161,8 +161,9 @@ def check_alike(scenes: Sequence[Scene], duration: float | None = None) -> float
             remedy = f"scenes[0] has {len(first.contacts)}; batch scenes with as many contacts"
             raise bad_value(f"number of scenes[{k}].contacts", len(scene.contacts), remedy)
         for i, (contact, wanted) in enumerate(zip(scene.contacts, first.contacts, strict=True)):
-            for name, kind in (("master", _kind), ("two_way", bool), ("law", _law), ("friction_laws", _laws)):
-                value, other = (kind(getattr(item, name)) for item in (contact, wanted))
+            kinds = (("master", _kind), ("two_way", bool), ("law", _law), ("friction_laws", _laws))
+            for name, kind in kinds:
+                value, other = (kind(getattr(item, name, None)) for item in (contact, wanted))
                 if value != other:
                     remedy = f"that of scenes[0] is {other}; batch scenes with contacts of the same kinds"
                     raise bad_value(f"scenes[{k}].contacts[{i}].{name}", value, remedy)
@@ -170,7 +171,7 @@ def check_alike(scenes: Sequence[Scene], duration: float | None = None) -> float
 
 
 def _kind(master: object) -> str:
-    return "RigidPlane" if isinstance(master, RigidPlane) else "Surface"
+    return "of ContactAll" if master is None else type(master).__name__
 
 
 def _law(law: object) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.geometry import Cad, MeshFile
-from warp_mca.scene import RigidPlane, Scene
+from warp_mca.scene import Contact, ContactAll, RigidPlane, Scene
 from warp_mca.scene.materials import Elastic
 
 if TYPE_CHECKING:
@@ -183,8 +183,10 @@ def _elastic(body: Body) -> object:
     return [(item.E, item.nu, item.rho) if isinstance(item, Elastic) else item for item in materials]
 
 
-def _contact_key(contact: Contact) -> object:
+def _contact_key(contact: Contact | ContactAll) -> object:
     laws = [type(law).__name__ for law in (contact.law, *contact.friction_laws)]
+    if isinstance(contact, ContactAll):
+        return contact.exclude, contact.self_contact, laws, contact.penalty
     return isinstance(contact.master, RigidPlane), contact.two_way, laws, contact.penalty
 
 

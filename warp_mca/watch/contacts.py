@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from warp_mca.physics.contact.surfaces import face_geometry, is_curved_contact
 from warp_mca.scene import RigidPlane
-from warp_mca.watch.row import Array, Finished, Values, row
+from warp_mca.watch.row import Array, Finished, Values, listed_passes, row
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
@@ -32,13 +32,11 @@ BOUND = 0.1  # component of a normal along an axis from which on a node that is 
 def small_patch(c: Finished, patch: float) -> Iterator[Values]:
     """Nodes that carried each contact when its force was greatest."""
     greatest = c.ledger.kept.peaks[:, 0]
-    for k, item in enumerate(c.model.passes):
-        own = [
-            greatest[other] for other, it in enumerate(c.model.passes) if it.contact == item.contact and it.sign > 0.0
-        ]
-        if item.sign > 0.0 and greatest[k] == max(own) and (count := _few_nodes(c, k, patch)):
+    for k, item, contact in listed_passes(c.scene, c.model):
+        own = [e for e, other in enumerate(c.model.passes) if other.contact == item.contact and other.sign > 0.0]
+        if item.sign > 0.0 and greatest[k] == greatest[own].max() and (count := _few_nodes(c, k, patch)):
             at_all = "less than three cells across" if is_curved_contact(c.model.X, item) else "a corner or an edge"
-            yield dict(body=c.scene.contacts[item.contact].slave.body, count=count, at_all=at_all)
+            yield dict(body=contact.slave.body, count=count, at_all=at_all)
 
 
 @row(
@@ -48,14 +46,14 @@ def small_patch(c: Finished, patch: float) -> Iterator[Values]:
 )
 def driven_into_a_plane(c: Finished, _: float) -> Iterator[Values]:
     """Depth of nodes that are fixed or driven along the normal of a rigid plane."""
-    for depth, item in zip(c.depths, c.model.passes, strict=True):
+    for k, item, contact in listed_passes(c.scene, c.model):
         if item.plane is not None:
+            depth = c.depths[k]
             normal = np.asarray(item.plane.normal, dtype=float)
             speed = _bound_speed(c.model, item.slave, normal / np.linalg.norm(normal))
             pushed = (speed < 0.0) & (depth > 0.0)
             if pushed.any():
-                body = c.scene.contacts[item.contact].slave.body
-                yield dict(pushed=int(pushed.sum()), body=body, depth=depth[pushed].max())
+                yield dict(pushed=int(pushed.sum()), body=contact.slave.body, depth=depth[pushed].max())
 
 
 @row(
@@ -67,14 +65,13 @@ def driven_into_a_plane(c: Finished, _: float) -> Iterator[Values]:
 )
 def deep_in_a_thin_body(c: Finished, most: float) -> Iterator[Values]:
     """Greatest depth of nodes; half a face, which a guard allows, may be wider than a plate is thick."""
-    for depth, item in zip(c.depths, c.model.passes, strict=True):
-        contact = c.scene.contacts[item.contact]
+    for k, item, contact in listed_passes(c.scene, c.model):
         if isinstance(contact.master, RigidPlane):
             continue
         slave, master = contact.slave.body, contact.master.body
         if item.sign < 0.0:
             slave, master = master, slave
-        thickness, deepest = _thickness(c.model.X[c.nodes(master)]), float(depth.max(initial=0.0))
+        thickness, deepest = _thickness(c.model.X[c.nodes(master)]), float(c.depths[k].max(initial=0.0))
         if deepest > most * thickness:
             yield dict(slave=slave, depth=deepest, master=master, thickness=thickness)
 
@@ -89,8 +86,7 @@ def deep_in_a_thin_body(c: Finished, most: float) -> Iterator[Values]:
 )
 def undented_master(c: Finished, least: float) -> Iterator[Values]:
     """Area of a curved contact over that of the faces of a master that is not rigid."""
-    for k, item in enumerate(c.model.passes):
-        contact = c.scene.contacts[item.contact]
+    for k, item, contact in listed_passes(c.scene, c.model):
         if isinstance(contact.master, RigidPlane) or not item.leads or contact.master.body in c.scene.rigid_names:
             continue
         if _few_nodes(c, k, PATCH):  # they do not tell how wide the pressed place is

@@ -88,7 +88,7 @@ def coarse_slave(c: Context, most: float) -> Iterator[Values]:
 
     The lesser of the ratio of the smallest and that of the usual: faces far from contact may be of any size.
     """
-    for contact in c.scene.contacts:
+    for contact in c.scene.listed:
         if contact.two_way is not False or isinstance(contact.master, RigidPlane):
             continue
         sides = ((c.meshes[side.body], side.nodes) for side in (contact.slave, contact.master))

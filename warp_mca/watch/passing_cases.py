@@ -15,6 +15,7 @@ from warp_mca.base.arrays import Array, Index
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.model import Model
 from warp_mca.scene import RigidPlane, Scene
+from warp_mca.watch.row import listed_passes
 from warp_mca.watch.skins import NOWHERE, Found, Skin, crossed
 
 Mask = NDArray[np.bool_]
@@ -25,8 +26,8 @@ BEND = 0.25  # of the gap between parts of a body that its nodes move out of sha
 SLENDER = 8.0  # lengths over thickness from which on a body without gaps may meet itself
 ROOM = 1.5  # times the reach of the place where bound bodies meet at the start: there they may overlap
 
-APART = "no contact keeps them out there; take all of the surface, such as nodes='boundary', in a Contact"
-PARTS = "no contact keeps them apart; make bodies of them, welded where they hang together"
+APART = "no contact keeps them out there; take contacts='all', or the whole surface, as nodes='boundary', in a Contact"
+PARTS = "no contact keeps them apart; take contacts='all', or a ContactAll beside the contacts that are listed"
 BETWEEN = (
     "contact keeps only nodes of a slave out of its master, and edges pass between them; let nodes lie closer where "
     "the bodies meet, and set two_way"
@@ -171,13 +172,15 @@ def cases_of(scene: Scene, meshes: Mapping[str, Mesh], model: Model, skins: Sequ
     number = {skin.name: k for k, skin in enumerate(skins)}
     passes: dict[frozenset[str], tuple[int, ...]] = {}
     planes: dict[tuple[str, RigidPlane], tuple[int, ...]] = {}
-    for k, item in enumerate(model.passes):
-        slave, master = scene.contacts[item.contact].slave.body, scene.contacts[item.contact].master
+    for k, _, contact in listed_passes(scene, model):
+        slave, master = contact.slave.body, contact.master
         if isinstance(master, RigidPlane):
             planes[slave, master] = (*planes.get((slave, master), ()), k)
         else:
             names = frozenset((slave, master.body))
             passes[names] = (*passes.get(names, ()), k)
+    general = tuple(k for k, item in enumerate(model.passes) if item.pairs)
+    passes |= {frozenset(pair): general for pair in scene.general_pairs()}
     for (name, plane), own in planes.items():
         skin = skins[number[name]]
         kept_out = np.isin(skin.nodes, np.concatenate([model.passes[k].slave for k in own]))

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from warp_mca.base.arrays import Array
-from warp_mca.scene import RigidPlane
+from warp_mca.scene import Contact, ContactAll, RigidPlane
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
     from warp_mca.model.model import Model
+    from warp_mca.physics.contact.surfaces import ContactPass
     from warp_mca.results.contact_history import ContactHistory
     from warp_mca.rigid.handoff import HandOff
-    from warp_mca.scene import Contact, Scene
+    from warp_mca.scene import Scene
     from warp_mca.watch.ledger import Ledger
     from warp_mca.watch.passing import Watch
 
@@ -143,6 +144,16 @@ class Finished(Context):
     origin: float
 
 
-def sides_of(contact: Contact) -> list[str]:
-    """Bodies of a contact, the slave first."""
+def listed_passes(scene: Scene, model: Model) -> Iterator[tuple[int, ContactPass, Contact]]:
+    """Passes of listed contacts: their number, what they are and the contact that they belong to."""
+    for k, item in enumerate(model.passes):
+        contact = scene.contacts[item.contact]
+        if isinstance(contact, Contact):
+            yield k, item, contact
+
+
+def sides_of(contact: Contact | ContactAll) -> list[str]:
+    """Bodies of a listed contact, the slave first."""
+    if isinstance(contact, ContactAll):
+        return []
     return [contact.slave.body, *([] if isinstance(contact.master, RigidPlane) else [contact.master.body])]

@@ -151,7 +151,7 @@ def penalty_in_newtons_per_metre(c: Context, most: float) -> Iterator[Values]:
     """Penalty of each contact."""
     for contact in c.scene.contacts:
         if not isinstance(contact.penalty, str | None) and contact.penalty >= most:
-            yield dict(who=" and ".join(sides_of(contact)), penalty=contact.penalty)
+            yield dict(who=" and ".join(sides_of(contact)) or "all bodies", penalty=contact.penalty)
 
 
 @advice(
@@ -164,7 +164,8 @@ def penalty_in_newtons_per_metre(c: Context, most: float) -> Iterator[Values]:
 def supersonic_approach(c: Context, most: float) -> Iterator[Values]:
     """Speed at which the bodies of a contact approach each other."""
     for contact, (normal, _) in zip(c.scene.contacts, c.model.contact_axes, strict=True):
-        sides = sides_of(contact)
+        if not (sides := sides_of(contact)):
+            continue
         bodies = [c.scene.body(name) for name in sides]
         waves = sum(max(m.wave_speeds["bar"] for m in _materials_of(body)) for body in bodies if not body.rigid)
         velocity = [np.asarray(c.model.V[c.nodes(name)].mean(axis=0)) for name in sides]

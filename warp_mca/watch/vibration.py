@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from warp_mca.kernels.records.columns import FRICTION, IMPULSE, NORMAL_IMPULSE, SPRING_ENERGY
 from warp_mca.physics.contact.surfaces import face_geometry, is_curved_contact
 from warp_mca.physics.elements.cells import body_materials
-from warp_mca.watch.row import Array, Finished, Values, row, sides_of
+from warp_mca.watch.row import Array, Finished, Values, listed_passes, row, sides_of
 
 if TYPE_CHECKING:
     from warp_mca.physics.contact.surfaces import ContactPass
@@ -78,8 +78,8 @@ def ringing(c: Finished, times: float) -> Iterator[Values]:
     Waves that come back from free ends only take from it. So nothing is said of bodies that have more behind them or
     meet twice: with joints, ties, driven nodes, or other contacts.
     """
-    for item in c.model.passes:
-        contact, history = c.scene.contacts[item.contact], c.contacts[item.contact]
+    for _, item, contact in listed_passes(c.scene, c.model):
+        history = c.contacts[item.contact]
         greatest = float(history.pressure.max(initial=0.0))
         if not item.leads or greatest == 0.0 or not _is_first_impact(c, contact, item):
             continue
@@ -166,6 +166,7 @@ def _is_first_impact(c: Finished, contact: Contact, item: ContactPass) -> bool:
     normal = c.model.contact_axes[item.contact, 0]
     return (
         normal.any()
+        and scene.general is None
         and not bound.intersection(sides_of(contact))
         and not scene.body(contact.slave.body).rigid
         and not _is_held(c, contact.slave.body, normal)

@@ -11,10 +11,11 @@ import numpy as np
 from warp_mca.kernels.contact import contact
 from warp_mca.kernels.contact.spring_sums import sum_springs
 from warp_mca.physics.actor import Actor, When
+from warp_mca.physics.contact.contact_state import ContactState
 from warp_mca.physics.contact.edge_stage import EdgeStage
 from warp_mca.physics.contact.extremes import NormalForce
 from warp_mca.physics.contact.skin_edges import EdgePass
-from warp_mca.physics.contact.stage import ContactStage, ContactState
+from warp_mca.physics.contact.stage import ContactStage
 from warp_mca.step.stage import BESIDE, BEYOND, LISTS, SPRINGS, Search, Stage, Step
 
 if TYPE_CHECKING:

@@ -11,9 +11,11 @@ import warp as wp
 from warp_mca.base.arrays import Index
 from warp_mca.base.joining import offsets
 from warp_mca.kernels.contact import contact, edge_pairs, edge_search, edge_springs, search
+from warp_mca.physics.contact.contact_state import ContactState
+from warp_mca.physics.contact.per_scene import per_scene
 from warp_mca.physics.contact.skin_edges import EdgePass
 from warp_mca.physics.contact.slave_edges import new_springs
-from warp_mca.physics.contact.stage import ContactStage, ContactState, per_scene
+from warp_mca.physics.contact.stage import ContactStage
 from warp_mca.physics.contact.surfaces import LIST_LENGTH
 from warp_mca.step.threads import CONTACT, Split, whole
 
@@ -56,6 +58,12 @@ class EdgeStage(ContactStage):
         found.beside = wp.array(self._join(f"{side}_beside"), dtype=wp.int32)
         found.size = wp.array(self._join(f"{side}_size"), dtype=wp.float64)
         found.stiffness = wp.array(self._join(stiffness), dtype=wp.float64)
+        bodies, tables = self._join(f"{side}_body"), offsets([item.factor.size for item in self.items])
+        if side == "slave":  # rows of the table
+            rows = zip(self.items, tables, strict=False)
+            bodies = np.concatenate([first + len(item.factor) * item.slave_body for item, first in rows])
+        found.body = wp.array(bodies, dtype=wp.int32)
+        found.factor = wp.array(np.concatenate([item.factor.ravel() for item in self.items]), dtype=wp.float64)
         return found
 
     def _make_rows(self) -> None:
@@ -95,6 +103,7 @@ class EdgeStage(ContactStage):
             face_count=wp.zeros(self.count, dtype=wp.int32),
             face_slave=wp.zeros((self.count, ROOM), dtype=wp.int32),
             u_search=wp.zeros(0, dtype=wp.vec3d),
+            slot=wp.zeros((0, 0), dtype=wp.int32),
         )
 
     def kernels(self) -> list[Any]:

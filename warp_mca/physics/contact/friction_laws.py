@@ -10,7 +10,7 @@ import numpy as np
 from warp_mca.base.arrays import Array
 from warp_mca.geometry.cell_types import is_triangle
 from warp_mca.physics.contact.sides import find_sides
-from warp_mca.scene import Contact
+from warp_mca.scene import Contact, ContactAll
 from warp_mca.scene.friction_laws import friction_parameters
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def node_areas(slave: Faces) -> Array:
     return total[nodes].max(axis=1)
 
 
-def friction_values(contact: Contact, slave: Faces) -> dict[str, Any]:
+def friction_values(contact: Contact | ContactAll, slave: Faces) -> dict[str, Any]:
     """Modules of the laws of friction that a contact pass has, and their parameters; nothing where there are none.
 
     Raises:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -38,6 +38,10 @@ class SkinEdges:
     size: Array
     radius: Array
 
+    def some(self, kept: np.ndarray) -> SkinEdges:
+        """Those of the edges for which `kept` is true."""
+        return SkinEdges(*(getattr(self, item.name)[kept] for item in fields(self)))
+
 
 def skin_edges(X: Array, faces: Faces) -> SkinEdges:
     """Edges of a surface where its faces meet at more than BLUNT, and bulge. X: positions [m], (node_count, 3)."""
@@ -65,6 +69,8 @@ class EdgePass(ContactPass):
         slave_beside, master_beside: corners of the two faces beside each, shape (edge_count, 8), int32.
         slave_size, master_size: edge of a square as large as these faces [m], shape (edge_count,), float64.
         master_stiffness: penalty stiffness of the master's edges [N/m], shape (edge_count,), float64.
+        slave_body, master_body: body of each edge in a general contact, shape (edge_count,), int32; else empty.
+        factor: of the stiffness between two bodies, as in `Pairs`; else empty.
     """
 
     slave_edge: Index = field(metadata=of("nodes"))
@@ -74,6 +80,9 @@ class EdgePass(ContactPass):
     slave_size: Array = field(metadata=AS_IS)
     master_size: Array = field(metadata=AS_IS)
     master_stiffness: Array = field(metadata=AS_IS)
+    slave_body: Index = field(default_factory=lambda: np.zeros(0, np.int32), metadata=AS_IS)
+    master_body: Index = field(default_factory=lambda: np.zeros(0, np.int32), metadata=AS_IS)
+    factor: Array = field(default_factory=lambda: np.zeros((0, 0)), metadata=AS_IS)
 
     @property
     def leads(self) -> bool:
@@ -93,7 +102,9 @@ def _kept(edges: SkinEdges, other: SkinEdges) -> np.ndarray:
 
 def _shared(first: ContactPass) -> dict[str, Any]:
     """What a pass of edges has from that of the nodes."""
-    names = "mu contact law parameters stiffening friction damping face side slave_face margin longest initial_overlap"
+    names = (
+        "mu contact law parameters stiffening friction damping face side slave_face margin longest initial_overlap sign"
+    )
     return {name: getattr(first, name) for name in (*names.split(), "penalty_given", "face_stiffness")}
 
 
@@ -106,7 +117,6 @@ def no_edges(first: ContactPass) -> EdgePass:
         slave=edge[:, 0],
         master=first.master,
         stiffness=none,
-        sign=1.0,
         friction_parameters=first.friction_parameters[:0],
         slave_edge=edge,
         master_edge=edge,
@@ -131,18 +141,39 @@ def edge_pass(X: Array, first: ContactPass, slave: Faces, master: Faces, contact
     kept, met = _kept(mine, theirs), _kept(theirs, mine)
     if not (kept.any() and met.any()):
         return None
-    mine, theirs = (
-        SkinEdges(e.node[k], e.face[k], e.length[k], e.size[k], e.radius[k]) for e, k in ((mine, kept), (theirs, met))
-    )
     factor, own, other = spring_stiffness(replace(contact, two_way=False), slave, master)
+    return _pass(first, slave, master, mine.some(kept), theirs.some(met), factor * own, factor * other)
+
+
+def general_edges(X: Array, first: ContactPass, union: Faces, own: Array) -> EdgePass | None:
+    """The pass of the edges of all bodies beside that of their nodes in a general contact.
+
+    Args:
+        X: positions [m], shape (node_count, 3).
+        first: pass of the nodes, which knows the pairs.
+        union: skins of all bodies.
+        own: penalty stiffness of a node on each face for a factor of 1 [N/m], shape (face_count,).
+    """
+    edges = skin_edges(X, union)
+    edges = edges.some(_kept(edges, edges))
+    if not len(edges.node):
+        return None
+    assert first.pairs is not None
+    found = _pass(first, union, union, edges, edges, 2.0 * own, 2.0 * own)  # a pair has half of it in either direction
+    body = first.pairs.face[edges.face[:, 0]]
+    return replace(found, slave_body=body, master_body=body, factor=first.pairs.factor)
+
+
+def _pass(
+    first: ContactPass, slave: Faces, master: Faces, mine: SkinEdges, theirs: SkinEdges, own: Array, other: Array
+) -> EdgePass:
     place = np.searchsorted(first.slave, mine.node[:, 0])
     friction = first.friction_parameters[place] if len(first.friction_parameters) else first.friction_parameters
     return EdgePass(
         **_shared(first),
         slave=mine.node[:, 0],
         master=np.unique(theirs.node).astype(np.int32),
-        stiffness=SHARE * factor * own[mine.face].mean(axis=1),
-        sign=1.0,
+        stiffness=SHARE * own[mine.face].mean(axis=1),
         friction_parameters=friction,
         slave_edge=mine.node,
         master_edge=theirs.node,
@@ -150,7 +181,7 @@ def edge_pass(X: Array, first: ContactPass, slave: Faces, master: Faces, contact
         master_beside=master.node[theirs.face].reshape(-1, 8),
         slave_size=mine.size,
         master_size=theirs.size,
-        master_stiffness=SHARE * factor * other[theirs.face].mean(axis=1),
+        master_stiffness=SHARE * other[theirs.face].mean(axis=1),
     )
 
 
@@ -163,4 +194,5 @@ def edge_eigenvalues(item: EdgePass, mass: Array) -> tuple[Index, Array]:
     ):
         np.maximum.at(most, edge.ravel(), np.repeat(np.minimum(own, other.max()), 2))
     nodes = np.flatnonzero(most).astype(np.int32)
+    most *= item.factor.max(initial=0.0) if item.factor.size else 1.0
     return nodes, 2.0 * item.stiffening * most[nodes] / mass[nodes]

@@ -13,7 +13,8 @@ from warp_mca.kernels.contact.laws import LINEAR, law_functions
 from warp_mca.step.threads import CONTACT, Split
 
 if TYPE_CHECKING:
-    from warp_mca.physics.contact.stage import ContactStage, ContactState
+    from warp_mca.physics.contact.contact_state import ContactState
+    from warp_mca.physics.contact.stage import ContactStage
     from warp_mca.step.state import State
     from warp_mca.step.workspace import Workspace
 
@@ -44,6 +45,17 @@ def new_springs(count: int, sided: int, stage: ContactStage) -> Any:
     return found
 
 
+def faces_of_slaves(stage: ContactStage, face: NDArray[np.int32], rows: tuple[wp.array, wp.array]) -> Any:
+    """`kernels.contact.edges.SlaveFaces`; `face`: shape (face_count, 4); `rows`: those around each node, compressed."""
+    number = np.full(stage.node_count, -1, np.int32)
+    number[np.concatenate([item.slave for item in stage.items])] = np.arange(len(stage.slave))
+    found = edges.SlaveFaces()
+    found.node, found.stiffness = stage.slave, stage.stiffness
+    found.face, found.number = (wp.array(values, dtype=wp.int32) for values in (face, number))
+    found.offset, found.face_of_slave = rows
+    return found
+
+
 class SlaveEdges:
     """Slave nodes with the faces around them, and the kernels that let edges of these faces rest on the master.
 
@@ -52,21 +64,16 @@ class SlaveEdges:
         carry, find: kernels of a step and of a search; see `kernels.contact.edge_shares`.
     """
 
-    def __init__(self, stage: ContactStage, face: NDArray[np.int32], rows: tuple[wp.array, wp.array]) -> None:
-        """`face`: of the slave, shape (face_count, 4); `rows`: those around each slave node, compressed."""
+    def __init__(self, stage: ContactStage) -> None:
         self.carry = edge_shares.carry_kernel(stage.sides)
         self.find = edge_shares.along_edges_kernel(stage.each, stage.sides)
-        number = np.full(stage.node_count, -1, np.int32)
-        number[np.concatenate([item.slave for item in stage.items])] = np.arange(len(stage.slave))
-        self.faces = edges.SlaveFaces()
-        self.faces.node, self.faces.stiffness = stage.slave, stage.stiffness
-        self.faces.face, self.faces.number = (wp.array(values, dtype=wp.int32) for values in (face, number))
-        self.faces.offset, self.faces.face_of_slave = rows
+        self.faces = stage.slave_faces
 
     def list_faces(self, stage: ContactStage, work: Workspace, state: State, u: wp.array) -> None:
         """Add to the lists of a search the faces along edges from nodes that slid off a side."""
         own = state.contacts[stage.index]
-        inputs = [stage.bvh.id, work.X, u, self.faces, stage.side, stage.slave_scene, stage.origin, own.spring]
+        inputs = [stage.bvh.id, work.X, u, self.faces, stage.side, stage.slave_scene, stage.origin]
+        inputs += [stage.pairs_of(own), own.spring]
         lists = [own.count, own.candidate, own.face_count, own.face_slave]
         wp.launch(self.find, len(stage.slave), inputs, [*lists, state.flag])
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -12,12 +11,15 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.base.joining import offsets
-from warp_mca.kernels.contact import contact, edges, nearest, search, sides
+from warp_mca.kernels.contact import contact, edges, nearest, pair_search, search, sides
 from warp_mca.kernels.contact.laws import Laws
 from warp_mca.kernels.records.columns import PASS, PASS_COLUMNS
+from warp_mca.physics.contact.contact_state import ContactState
 from warp_mca.physics.contact.dashpots import check_dashpots
 from warp_mca.physics.contact.friction_laws import friction_rows
-from warp_mca.physics.contact.slave_edges import SlaveEdges, new_springs
+from warp_mca.physics.contact.pairs import SLOTS, device_pairs
+from warp_mca.physics.contact.per_scene import numbers, per_scene, vectors
+from warp_mca.physics.contact.slave_edges import SlaveEdges, faces_of_slaves, new_springs
 from warp_mca.physics.contact.surfaces import LIST_LENGTH, ContactPass
 from warp_mca.step.threads import CONTACT, Split, whole
 
@@ -28,47 +30,9 @@ if TYPE_CHECKING:
     from warp_mca.step.workspace import Workspace
 
 
-def per_scene(first: NDArray[np.int32]) -> Any:
-    """Scene of each entry for kernels: 0 where there is one scene, else an array; see `kernels.hardware.per_scene`."""
-    if len(first) == 2:
-        return 0
-    return wp.array(np.repeat(np.arange(len(first) - 1), np.diff(first)), dtype=wp.int32)
-
-
-def _numbers(values: Sequence[float]) -> Any:
-    """A number of each scene, as kernels take it."""
-    return values[0] if len(values) == 1 else wp.array(list(values), dtype=wp.float64)
-
-
-def _vectors(values: Sequence[Any]) -> Any:
-    """A vector of each scene, as kernels take it."""
-    return wp.vec3d(*values[0]) if len(values) == 1 else wp.array(np.asarray(values), dtype=wp.vec3d)
-
-
 def has_sides(model: Model) -> bool:
     """Whether a master of the model has several sides, which need the latest forces on nodes."""
     return any(item.side.any() for item in model.passes)
-
-
-@dataclass(eq=False)
-class ContactState:
-    """State of a contact pass; lists are those of the latest search, and empty on a rigid plane.
-
-    Attributes:
-        spring: of each slave node and side, those of slave 0 first; `kernels.contact.spring.Spring` lists its arrays.
-        count: faces in the list of each slave and side [-], shape (spring_count,), int32.
-        candidate: these faces [-], shape (spring_count, LIST_LENGTH), int32.
-        face_count: slaves in the list of each master face [-], shape (face_count,), int32.
-        face_slave: these slaves, sorted [-], shape (face_count, room), int32.
-        u_search: displacement of slaves and masters at the search [m], shape (node_count,), vec3d.
-    """
-
-    spring: Any
-    count: wp.array
-    candidate: wp.array
-    face_count: wp.array
-    face_slave: wp.array
-    u_search: wp.array
 
 
 class ContactStage:
@@ -91,25 +55,28 @@ class ContactStage:
             self.kernel = contact.plane_kernel(friction, self.each, self.stress_free, self.laws)
             self._make_planes()
             return
+        slots = SLOTS if self.general and self.sides > 1 else 1
         self.kernel = (
-            contact.surface_kernel(friction, self.each, self.stress_free, self.laws, self.noted)
+            contact.surface_kernel(friction, self.each, self.stress_free, self.laws, self.noted, self.general)
             if self.sides == 1
-            else sides.sided_kernel(friction, self.each, self.sides, self.laws)
+            else sides.sided_kernel(friction, self.each, self.sides // slots, self.laws, slots)
         )
         self.lanes = contact.LANES if wp.get_device().is_cuda else 1
         self.react, self.bounds = (
             contact.react_kernel(self.each, self.lanes, self.noted),
             search.bounds_kernel(self.each),
         )
-        self.find = search.candidates_kernel(self.each, self.sides)
-        self.clear = search.clear_kernel(self.each, self.sides)
+        kernels = pair_search if self.general else search
+        self.find = kernels.candidates_kernel(self.each, self.sides)
+        self.clear = kernels.clear_kernel(self.each, self.sides)
+        self.slots = pair_search.slots_kernel(self.each, self.sides) if self.general and self.sides > 1 else None
         self._make_faces(model)
 
     def _begin(self, items: Sequence[ContactPass], model: Model, index: int, normal_force: NormalForce) -> None:
         """What springs need, whatever presses them."""
         self.items, self.index, self.column = items, index, PASS + PASS_COLUMNS * index
         self.per_newton, self.node_count = normal_force.per_newton, model.node_count
-        self.each = len(items) > 1
+        self.each, self.slots = len(items) > 1, None
         self.sides = max(item.sides for item in items)
         self.noted = has_sides(model)
         slaves = offsets([len(item.slave) for item in items])
@@ -118,7 +85,7 @@ class ContactStage:
         self.slave_scene = per_scene(slaves)
         self.slave = wp.array(self._join("slave"), dtype=wp.int32)
         self.stiffness = wp.array(self._join("stiffness"), dtype=wp.float64)
-        self.mu = _numbers([item.mu for item in items])
+        self.mu = numbers([item.mu for item in items])
         self.stress_free = any(item.initial_overlap == "stress_free" for item in items)
         self.laws = Laws(items[0].law, items[0].friction)
         check_dashpots(items)
@@ -151,19 +118,20 @@ class ContactStage:
             face_count=wp.zeros(faces, dtype=wp.int32),
             face_slave=wp.zeros((faces, room), dtype=wp.int32),
             u_search=wp.zeros(self.node_count if surface else 0, dtype=wp.vec3d),
+            slot=wp.full((len(self.slave), SLOTS) if self.slots else (0, 0), -1, dtype=wp.int32),
         )
 
     def _make_planes(self) -> None:
         planes = [item.plane for item in self.items if item.plane is not None]
         normals = [np.asarray(plane.normal, dtype=float) for plane in planes]
         unit = [normal / np.linalg.norm(normal) for normal in normals]
-        self.planes = [_vectors([p.point for p in planes]), _vectors(unit), _vectors([p.velocity for p in planes])]
-        self.deepest = _numbers([item.deepest for item in self.items])
+        self.planes = [vectors([p.point for p in planes]), vectors(unit), vectors([p.velocity for p in planes])]
+        self.deepest = numbers([item.deepest for item in self.items])
 
     def _make_faces(self, model: Model) -> None:
         faces = offsets([len(item.face) for item in self.items])
         masters = offsets([len(item.master) for item in self.items])
-        self.longest = _numbers([item.longest for item in self.items])
+        self.longest = numbers([item.longest for item in self.items])
         self._place(model)
         self.face_scene, self.master_scene = per_scene(faces), per_scene(masters)
         self.face = wp.array(self._join("face"), dtype=wp.int32)
@@ -171,23 +139,30 @@ class ContactStage:
         self.side = wp.array(self._join("side"), dtype=wp.int32) if self.sides > 1 else 0
         self.master = wp.array(self._join("master"), dtype=wp.int32)
         self.face_offset, self.face_of_node = self._rows("face", "face_offset", "face_of_node")
-        self.edges = None
-        if self.sides > 1:
+        self.pairs, self.edges = device_pairs([item.pairs for item in self.items]), None
+        if self.sides > 1 or self.general:
             rows = self._rows("slave_face", "slave_offset", "face_of_slave")
-            self.edges = SlaveEdges(self, self._join("slave_face"), rows)
+            self.slave_faces = faces_of_slaves(self, self._join("slave_face"), rows)
+        if self.sides > 1:
+            self.edges = SlaveEdges(self)
         self.lower = wp.zeros(len(self.face), dtype=wp.vec3f)
         self.upper = wp.zeros(len(self.face), dtype=wp.vec3f)
         self.bvh: Any = None
 
     def _place(self, model: Model) -> None:
         """Where the search looks, and how far ahead."""
-        self.margin = _numbers([item.margin for item in self.items])
-        self.origin = _vectors([model.X[item.master].mean(axis=0) for item in self.items])
+        self.margin = numbers([item.margin for item in self.items])
+        self.origin = vectors([model.X[item.master].mean(axis=0) for item in self.items])
 
     @property
     def on_plane(self) -> bool:
         """Whether the master is a rigid plane, in each scene."""
         return self.items[0].plane is not None
+
+    @property
+    def general(self) -> bool:
+        """Whether this is the pass of a general contact."""
+        return self.items[0].pairs is not None
 
     @property
     def is_replayable(self) -> bool:
@@ -209,14 +184,16 @@ class ContactStage:
         """Those of a search."""
         if self.on_plane:
             return []
-        return [self.bounds, self.find, self.clear, *([self.edges.find] if self.edges else [])]
+        slots, edge = [self.slots] if self.slots else [], [self.edges.find] if self.edges else []
+        return [self.bounds, self.find, self.clear, *slots, *edge]
 
     def begin(self, work: Workspace, state: State) -> None:
         """Note which slaves are clear of the master before the first step, after the first search."""
         if not self.on_plane:
-            inputs = [self.bvh.id, work.X, state.u, self.slave, self.face, self.side, self.slave_scene, self.origin]
-            held = state.contacts[self.index].spring.held
-            wp.launch(self.clear, len(self.slave), inputs=[*inputs, self.longest], outputs=[held])
+            own = state.contacts[self.index]
+            inputs = [self.bvh.id, work.X, state.u, self.slave, self.face, *self._tables(own), self.side]
+            inputs += [self.slave_scene, self.origin, self.longest]
+            wp.launch(self.clear, len(self.slave), inputs=inputs, outputs=[own.spring.held])
 
     def search(self, work: Workspace, state: State) -> None:
         """Broad phase: list what each slave may touch until the next search."""
@@ -242,12 +219,16 @@ class ContactStage:
         """Second part of a search: the lists, which contact reads."""
         if self.on_plane:
             return
-        own, slaves = state.contacts[self.index], [work.X, u, self.slave]
+        own, places = state.contacts[self.index], [self.bvh.id, work.X, u]
         own.face_count.zero_()
+        inputs = [*places, *([self.slave_faces, self.face, self.pairs_of(own)] if self.general else [self.slave])]
+        if self.slots:
+            spaces = [self.slave_scene, self.origin, own.spring]
+            wp.launch(self.slots, len(self.slave), inputs=[*inputs, *spaces], outputs=[own.slot])
         wp.launch(
             self.find,
             len(self.slave),
-            inputs=[self.bvh.id, *slaves, self.side, self.slave_scene, self.origin],
+            inputs=[*inputs, self.side, self.slave_scene, self.origin],
             outputs=[own.count, own.candidate, own.face_count, own.face_slave, own.u_search, state.flag],
         )
         if self.edges:
@@ -274,7 +255,7 @@ class ContactStage:
             inputs += [self.per_newton, dt, own.spring]
             split(len(self.slave), partial(launch, self.kernel, 1, inputs), CONTACT)
             return
-        inputs = [*nodes, own.u_search, *slaves, self.faces_of(own)]
+        inputs = [*nodes, own.u_search, *slaves, self.faces_of(own), *(self._tables(own) or [0])]
         if self.edges:
             inputs = [self._surfaces(work, state), state.v, own.u_search]
         inputs += [self.slave_scene, self.mu, self.margin, self.per_newton, dt, own.spring]
@@ -292,12 +273,22 @@ class ContactStage:
         found.count, found.candidate = own.count, own.candidate
         return found
 
+    def pairs_of(self, own: ContactState) -> Any:
+        """Bodies of a general contact with the springs that each node has for them; empty in a listed contact."""
+        self.pairs.slot = own.slot
+        return self.pairs
+
+    def _tables(self, own: ContactState) -> list[Any]:
+        """The argument that kernels of general contact have beside those of a listed one."""
+        return [self.pairs_of(own)] if self.general else []
+
     def _surfaces(self, work: Workspace, state: State) -> Any:
         """Both surfaces, as the kernel of a master with several sides takes them."""
         assert self.edges
         found = edges.Surfaces()
+        own = state.contacts[self.index]
         found.X, found.u, found.slaves = work.X, state.u, self.edges.faces
-        found.master = self.faces_of(state.contacts[self.index])
+        found.master, found.pairs = self.faces_of(own), self.pairs_of(own)
         return found
 
     def rest_at(self, state: State, depth: NDArray[np.float64]) -> None:

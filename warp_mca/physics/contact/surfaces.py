@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.geometry.cell_types import is_triangle
 from warp_mca.physics.contact.friction_laws import friction_values
+from warp_mca.physics.contact.pairs import SLOTS, Pairs
 from warp_mca.physics.contact.sides import find_sides, is_curved, stiffest_fold
-from warp_mca.scene import Contact, RigidPlane
+from warp_mca.scene import Contact, ContactAll, RigidPlane
 from warp_mca.scene.contact_laws import law_values
 
 Array = NDArray[np.float64]
@@ -73,7 +74,8 @@ class ContactPass:
         decay: greatest of what dashpots add to the diagonal of M^-1 C, by the bound of `contact_eigenvalues` [1/s].
         slave_face, slave_offset, face_of_slave: the slave's faces, and those around each slave node, compressed rows,
             int32.
-        sign: +1 where the forces on the slaves are the contact's forces, -1 in the return pass of two-way contact.
+        sign: +1 where the forces on the slaves are the contact's forces, -1 in the return pass of two-way contact,
+            0 of a general contact, whose springs hold both.
         contact: which of the scene's contacts this belongs to.
         plane: the rigid plane, or None.
         face: master faces, shape (face_count, 4), int32.
@@ -87,6 +89,7 @@ class ContactPass:
         room: slave nodes that the list of a face holds.
         deepest: penetration of a plane that stops the run [m]; faces have half their own size.
         initial_overlap: as in `Contact`.
+        pairs: bodies of a general contact, or None.
         penalty_given: whether the scene gives a number for the penalty.
     """
 
@@ -118,6 +121,7 @@ class ContactPass:
     room: int = field(default=LIST_LENGTH, metadata=AS_IS)
     deepest: float = field(default=0.0, metadata=AS_IS)
     initial_overlap: str = field(default="refuse", metadata=AS_IS)
+    pairs: Pairs | None = field(default=None, metadata=AS_IS)
     penalty_given: bool = field(default=False, metadata=AS_IS)
 
     @property
@@ -132,8 +136,9 @@ class ContactPass:
 
     @property
     def sides(self) -> int:
-        """How many sides the master has."""
-        return int(self.side.max(initial=0)) + 1
+        """How many springs a slave node has: for each side of the master, of several bodies in a general contact."""
+        sides = int(self.side.max(initial=0)) + 1
+        return sides * SLOTS if self.pairs and sides > 1 else sides
 
 
 def face_geometry(X: Array, face: Index) -> tuple[Array, Array]:
@@ -184,7 +189,7 @@ def is_two_way(contact: Contact, slave: Faces, master: Faces | None) -> bool:
     return bool(math.sqrt(ratio) > WIDER)
 
 
-def _node_mean(nodes: Index, faces: Faces, value: Array) -> Array:
+def node_mean(nodes: Index, faces: Faces, value: Array) -> Array:
     """Mean over the faces around each node of a value given on faces."""
     total = np.zeros(nodes[-1] + 1)
     count = np.zeros(nodes[-1] + 1)
@@ -202,7 +207,7 @@ def _room(slave: Faces, master: Faces, margin: float) -> int:
         return np.where(is_triangle(faces.node), 2.0, 1.0) * faces.area
 
     side = float(np.sqrt(cell(master).max())) + 2.0 * margin
-    spacing = float(np.sqrt(_node_mean(slave.nodes, slave, cell(slave)).min()))
+    spacing = float(np.sqrt(node_mean(slave.nodes, slave, cell(slave)).min()))
     most = 2.0 * (side / spacing + 1.0) ** 2
     return min(LIST_LENGTH * math.ceil(most / LIST_LENGTH), LONGEST_LIST)
 
@@ -218,9 +223,17 @@ def _faces_around(nodes: Index, face: Index) -> tuple[Index, Index]:
     return offset.astype(np.int32), (order // 4).astype(np.int32)
 
 
-def _surface_pass(
-    contact: Contact, index: int, slave: Faces, master: Faces, factor: float, own: Array, other: Array, sign: float
+def surface_pass(
+    contact: Contact | ContactAll,
+    index: int,
+    slave: Faces,
+    master: Faces,
+    factor: float,
+    own: Array,
+    other: Array,
+    sign: float,
 ) -> ContactPass:
+    """A pass in which faces of the master have `factor` times the stiffness `other`, slave nodes the mean of `own`."""
     nodes, masters = slave.nodes, master.nodes
     margin = SEARCH_MARGIN * float(np.sqrt(master.area.min()))
     longest = float(np.sqrt(master.area.max()))
@@ -229,7 +242,7 @@ def _surface_pass(
     slave_offset, around_slave = _faces_around(nodes, slave.node)
     return ContactPass(
         slave=nodes,
-        stiffness=factor * _node_mean(nodes, slave, own),
+        stiffness=factor * node_mean(nodes, slave, own),
         face_stiffness=factor * other,
         mu=contact.mu,
         **law_values(contact.law, 0.5 * longest),
@@ -271,7 +284,7 @@ def contact_passes(contact: Contact, index: int, slave: Faces, master: Faces | N
         return [
             ContactPass(
                 slave=nodes,
-                stiffness=factor * _node_mean(nodes, slave, own),
+                stiffness=factor * node_mean(nodes, slave, own),
                 slave_face=slave.node,
                 mu=contact.mu,
                 **law_values(contact.law, deepest),
@@ -283,27 +296,7 @@ def contact_passes(contact: Contact, index: int, slave: Faces, master: Faces | N
                 initial_overlap=contact.initial_overlap,
             )
         ]
-    passes = [_surface_pass(contact, index, slave, master, factor, own, other, 1.0)]
+    passes = [surface_pass(contact, index, slave, master, factor, own, other, 1.0)]
     if contact.two_way:
-        passes.append(_surface_pass(contact, index, master, slave, factor, other, own, -1.0))
+        passes.append(surface_pass(contact, index, master, slave, factor, other, own, -1.0))
     return passes
-
-
-def contact_eigenvalues(item: ContactPass, slave: Faces, master: Faces | None, mass: Array) -> tuple[Index, Array]:
-    """What a pass can add to the largest eigenvalue at its nodes [1/s^2]: row sums of M^-1 K of its springs.
-
-    A slave's row sums to k (1 + sum N) / m = 2 k / m, or k / m against a plane, and to more where sides of the master
-    press it at once; a master node's to as much, times the number of slave nodes that share its area. k is the greatest
-    stiffness that the spring can have: that of the stiffest master face for a slave node, that of the stiffest face
-    around it for a master node; both times what the contact law adds as it stiffens.
-    """
-    if master is None:
-        return item.slave, item.stiffening * item.stiffness / mass[item.slave]
-    at_once = item.stiffening * item.at_once
-    slave_k = at_once * np.minimum(item.stiffness, item.face_stiffness.max())
-    around = np.maximum.reduceat(item.face_stiffness[item.face_of_node], item.face_offset[:-1])
-    master_k = at_once * np.minimum(around, item.stiffness.max())
-    slave_area = 4.0 * np.median(_node_mean(item.slave, slave, slave.area / 4.0))
-    shared = np.maximum(1.0, 4.0 * _node_mean(item.master, master, master.area / 4.0) / slave_area)
-    nodes = np.concatenate([item.slave, item.master])
-    return nodes, np.concatenate([2.0 * slave_k / mass[item.slave], 2.0 * master_k * shared / mass[item.master]])
