@@ -33,7 +33,7 @@ class Met:
         before: the spring whose crossing goes on here, itself if it did, or -1 for a new crossing.
         taken: the spring that takes this one's crossing over, or NOBODY.
         weight, normal, gap, du: as in `Crossing`.
-        force, tangential: of the spring `before` in the last step [N]. stiffness, energy: its own [N/m], [J].
+        force, tangential, stiffness, energy: of the spring `before` in the last step [N], [N/m], [J].
     """
 
     edge: wp.array(dtype=wp.int32)
@@ -112,13 +112,13 @@ def meet_kernel() -> Any:
         candidate: wp.array2d(dtype=wp.int32),
         dt: wp.float64,
         spring: Spring,
-        met: Met,
+        met_out: Met,
     ):
         a = first + wp.tid()
         begin = wp.static(SLOTS) * a
         end = begin + wp.static(SLOTS)
         for s in range(begin, end):
-            met.edge[s] = -1
+            met_out.edge[s] = -1
         for c in range(count[a]):
             b = candidate[a, c]
             place = int(-1)
@@ -140,21 +140,21 @@ def meet_kernel() -> Any:
                     begins = may_begin(-hit.gap, spring.held[before], hit.approach, size)
                 if begins and place < 0:
                     for s in range(end - 1, begin - 1, -1):
-                        if spring.face[s] < 0 and met.edge[s] < 0:
+                        if spring.face[s] < 0 and met_out.edge[s] < 0:
                             place = s
                 if begins and place >= 0:
-                    met.edge[place] = b
-                    met.before[place] = before
-                    met.weight[place] = hit.weight
-                    met.normal[place] = hit.normal
-                    met.gap[place] = hit.gap
-                    met.du[place] = hit.du
+                    met_out.edge[place] = b
+                    met_out.before[place] = before
+                    met_out.weight[place] = hit.weight
+                    met_out.normal[place] = hit.normal
+                    met_out.gap[place] = hit.gap
+                    met_out.du[place] = hit.du
                     if before >= 0 and before != place:
-                        wp.atomic_min(met.taken, before, place)
-                        met.force[place] = spring.force[before]
-                        met.tangential[place] = spring.tangential[before]
-                        met.stiffness[place] = spring.stiffness[before]
-                        met.energy[place] = spring.energy[before]
+                        wp.atomic_min(met_out.taken, before, place)
+                        met_out.force[place] = spring.force[before]
+                        met_out.tangential[place] = spring.tangential[before]
+                        met_out.stiffness[place] = spring.stiffness[before]
+                        met_out.energy[place] = spring.energy[before]
 
     return meet_edges
 
@@ -244,12 +244,12 @@ def share_kernel() -> Any:
         edge_count: wp.array(dtype=wp.int32),
         edge_slave: wp.array2d(dtype=wp.int32),
         spring: Spring,
-        met: Met,
+        met_out: Met,
         nodal_force_out: wp.array(dtype=wp.vec3d),
     ):
         m = first + wp.tid()
-        if m < met.taken.shape[0]:
-            met.taken[m] = wp.static(NOBODY)
+        if m < met_out.taken.shape[0]:
+            met_out.taken[m] = wp.static(NOBODY)
         if m < node.shape[0]:
             i = node[m]
             total = wp.vec3d()

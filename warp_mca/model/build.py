@@ -20,8 +20,8 @@ from warp_mca.physics.contact.auto_penalty import ChosenPenalty, settled
 from warp_mca.physics.contact.axes import contact_axes
 from warp_mca.physics.contact.eigenvalues import contact_eigenvalues
 from warp_mca.physics.contact.general import general_passes
-from warp_mca.physics.contact.skin_edges import edge_eigenvalues, edge_pass
-from warp_mca.physics.contact.surfaces import ContactPass, contact_passes, is_two_way
+from warp_mca.physics.contact.skin_edges import edge_eigenvalues, edge_pass, is_two_way
+from warp_mca.physics.contact.surfaces import ContactPass, contact_passes
 from warp_mca.physics.joints.constraints import check_bindings, constraints, free_nodes, join_bodies, nodes_of
 from warp_mca.physics.loads.joint_loads import hinge_loads, movable_bases
 from warp_mca.physics.loads.nodal import loaded_nodes

@@ -1,4 +1,4 @@
-"""Owns the edges of two surfaces that may press each other: those that cross where no node of either is near."""
+"""Owns what two surfaces need beside the slave's nodes: edges that may cross between nodes, and the master's nodes."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from warp_mca.physics.contact.surfaces import ContactPass, Faces, spring_stiffne
 from warp_mca.scene import Contact
 
 BLUNT = math.radians(3.0)  # angle between the faces beside an edge from which on it may press another
+WIDER = 1.5  # ratio of widths of the slave's and the master's faces from which on the master's nodes could pass unseen
 SHARE = 0.25  # stiffness of a crossing over that of a node: a node that is pressed may bear a crossing as well
 COARSE = 0.5  # length of an edge that nodes see pass, as a share of the radius of what passes, at most
 
@@ -59,6 +60,17 @@ def skin_edges(X: Array, faces: Faces) -> SkinEdges:
     return SkinEdges(node, face, length, np.sqrt(area), radius)
 
 
+def is_two_way(contact: Contact, slave: Faces, master: Faces | None) -> bool:
+    """Whether the master's nodes are kept out of the slave's faces, too: as the contact says, else if these are wider.
+
+    That is the lesser of the ratio of the smallest and that of the usual: faces far from contact may be of any size.
+    """
+    if contact.two_way is not None or master is None:
+        return bool(contact.two_way)
+    ratio = min(slave.area.min() / master.area.min(), np.median(slave.area) / np.median(master.area))
+    return bool(math.sqrt(ratio) > WIDER)
+
+
 @joinable
 @dataclass(frozen=True, kw_only=True)
 class EdgePass(ContactPass):
@@ -70,7 +82,7 @@ class EdgePass(ContactPass):
         slave_size, master_size: edge of a square as large as these faces [m], shape (edge_count,), float64.
         master_stiffness: penalty stiffness of the master's edges [N/m], shape (edge_count,), float64.
         slave_body, master_body: body of each edge in a general contact, shape (edge_count,), int32; else empty.
-        factor: of the stiffness between two bodies, as in `Pairs`; else empty.
+        factor: of the stiffness between two bodies there, as in `Pairs`, float64; else empty.
     """
 
     slave_edge: Index = field(metadata=of("nodes"))

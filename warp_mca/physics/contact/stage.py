@@ -62,10 +62,8 @@ class ContactStage:
             else sides.sided_kernel(friction, self.each, self.sides // slots, self.laws, slots)
         )
         self.lanes = contact.LANES if wp.get_device().is_cuda else 1
-        self.react, self.bounds = (
-            contact.react_kernel(self.each, self.lanes, self.noted),
-            search.bounds_kernel(self.each),
-        )
+        self.react = contact.react_kernel(self.each, self.lanes, self.noted)
+        self.bounds = search.bounds_kernel(self.each)
         kernels = pair_search if self.general else search
         self.find = kernels.candidates_kernel(self.each, self.sides)
         self.clear = kernels.clear_kernel(self.each, self.sides)

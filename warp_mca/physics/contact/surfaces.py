@@ -22,7 +22,6 @@ Index = NDArray[np.int32]
 SEARCH_MARGIN = 0.25  # margin of the search for faces, as a share of the edge of the smallest face
 LIST_LENGTH = 32  # faces near a slave node, and slave nodes near a face at least; a full list stops the run
 LONGEST_LIST = 4096  # slave nodes near a face at most
-WIDER = 1.5  # ratio of widths of the slave's and the master's faces from which on the master's nodes could pass unseen
 # Default spring stiffness over E* A^2 / V, with E* = E / (1 - nu^2): at nu = 0.3 as penalty = 1 and 5. Few nodes carry
 # a curved contact, so softer springs lower its force peak; see docs/measurements/methods.md.
 FLAT, CURVED = 0.7583, 3.792
@@ -176,17 +175,6 @@ def spring_stiffness(contact: Contact, slave: Faces, master: Faces | None) -> tu
         assert not isinstance(contact.penalty, str)  # `auto_penalty.settled` has replaced it
         factor, found = contact.penalty, [faces.bulk for faces in surfaces]
     return 0.5 * factor if contact.two_way else factor, found[0], found[-1]
-
-
-def is_two_way(contact: Contact, slave: Faces, master: Faces | None) -> bool:
-    """Whether the master's nodes are kept out of the slave's faces, too: as the contact says, else if these are wider.
-
-    That is the lesser of the ratio of the smallest and that of the usual: faces far from contact may be of any size.
-    """
-    if contact.two_way is not None or master is None:
-        return bool(contact.two_way)
-    ratio = min(slave.area.min() / master.area.min(), np.median(slave.area) / np.median(master.area))
-    return bool(math.sqrt(ratio) > WIDER)
 
 
 def node_mean(nodes: Index, faces: Faces, value: Array) -> Array:
