@@ -100,7 +100,9 @@ def seen(film: Film, found: Random) -> dict[str, Any]:
 
 def told(row: Mapping[str, Any]) -> bool:
     """Whether a run was stopped or refused, or warned that bodies went into each other."""
-    return row["status"] != "finished" or any(part in text for text in row["said"] for part in CAUSES.values())
+    return row["status"] in ("stopped", "refused") or any(
+        part in text for text in row["said"] for part in CAUSES.values()
+    )
 
 
 def silent(row: Mapping[str, Any]) -> bool:

@@ -25,13 +25,24 @@ def scene_of(family: str, seed: int) -> mca.Scene:
 
 
 def measure(task: Task) -> Row:
-    """The row of a scene."""
+    """The row of a scene, with the status `failed` where something broke."""
     import warp as wp
 
     setattr(wp.config, "quiet", True)  # noqa: B010
     logging.getLogger("warp_mca").setLevel(logging.ERROR)
+    row: Row = {"family": task[0], "seed": task[1], "device": task[2], "kinds": [], "cells": []}
+    begun = time.perf_counter()
+    try:
+        return row | judged(task)
+    except Exception as error:  # which must not end the runs of other scenes
+        wall = round(time.perf_counter() - begun, 2)
+        return row | {"status": "failed", "said": [f"{type(error).__name__}: {error}"], "wall": wall}
+
+
+def judged(task: Task) -> Row:
+    """What there is to say of a scene."""
     family, seed, device, finer = task
-    row: Row = {"family": family, "seed": seed, "device": device}
+    row: Row = {}
     if family not in FAMILIES:
         found = default(seed)
         row |= found.facts

@@ -56,7 +56,7 @@ def facts(rows: Sequence[Row]) -> list[tuple[str, str]]:
     meeting = [row for row in rows if "seen" in row]
     ended = Counter(row["status"] for row in rows)
     found = [("scenes", f"{len(rows)}"), ("ran to their end", f"{ended['finished']}")]
-    for status in ("refused", "stopped"):
+    for status in ("refused", "stopped", "failed"):
         causes = Counter(word(row["said"][0]) for row in rows if row["status"] == status)
         for cause, _ in causes.most_common():
             own = (row for row in rows if row["status"] == status and word(row["said"][0]) == cause)
@@ -91,6 +91,7 @@ def _meeting(rows: Sequence[Row], meeting: Sequence[Row]) -> list[tuple[str, str
         found.append(("run with finer cells too", f"{len(off)}"))
         found.append(("impulse of the first contact off: median, 90 %, greatest", values))
         found.append((f"impulse off by more than {percent(IMPULSE)}", seeds(wrong)))
+        found.append(("and nothing was said", seeds(row for row in wrong if not row["said"])))
     lost = (row for row in rows if row.get("momentum_off", 0.0) > 1e-3)
     found.append(("impulse recorded is not the change of momentum", seeds(lost)))
     return found
