@@ -47,9 +47,8 @@ def general_passes(parts: Assembly, contact: ContactAll, index: int) -> tuple[li
     offset, barred = _barred(parts.X, union, item, np.array(folds)[face_of])
     body, faces = slave_of[order].astype(np.int32), face_of.astype(np.int32)
     room = min(2 * item.room, LONGEST_LIST) if any(folds) else item.room  # folds crush cells
-    item = replace(
-        item, room=room, pairs=Pairs(body=body, face=faces, factor=factor, barred_offset=offset, barred=barred)
-    )
+    found = Pairs(body=body, face=faces, factor=factor, barred_offset=offset, barred=barred)
+    item = replace(item, room=room, pairs=found)
     added = _eigenvalues(parts.mass, item, union)
     edges = general_edges(parts.X, item, union, own)
     if edges is None:
