@@ -67,7 +67,7 @@ def velocity(scene: mca.Scene, **settings) -> tuple[mca.Result, np.ndarray]:
         (4.0, 2, 0.2, {"direction": (1.0, 0.0, 0.6), "penalty": 2.0}),
         (4.0, 2, 0.0, {}),
         (4.0, 2, 0.2, {"two_way": True}),
-        (1.0, 3, 0.5, {"two_way": True, "element": "hex8"}),
+        (1.0, 3, 0.5, {"two_way": True, "element": "hex8", "penalty": 1.0}),
         (3.5, 5, 0.2, {"m": 4, "rotation": (0.3, -0.7, 1.1), "penalty": 0.3}),
         (4.5, 5, 0.2, {"m": 4, "rigid": True}),
         (3.5, 5, 0.1, {"direction": (1.0, 0.0, 0.6)}),
@@ -123,8 +123,13 @@ def row(n: int, m: int, merged: bool, v: float, element: str = mca.Body.element,
     [
         (2, 2, 3.0, {}),
         (2, 2, 3.0, {"two_way": True}),
-        (5, 4, 3.0, {}),
-        (4, 2, 10.0, {"two_way": True, "element": "hex8"}),  # at 10 m/s blocks catch by chance with any element
+        (5, 4, 3.0, {"penalty": 1.0}),
+        (
+            4,
+            2,
+            10.0,
+            {"two_way": True, "element": "hex8", "penalty": 1.0},
+        ),  # catches by chance
         (2, 2, 3.0, {"mu": 0.1}),
     ],
     ids=str,
@@ -148,7 +153,7 @@ def test_a_block_that_strikes_a_side_just_below_its_edge_is_thrown_back(below: f
     scene = mca.Scene(
         name="strike",
         bodies=(block, wall),
-        contacts=(mca.Contact(slave=surfaces[0], master=surfaces[1], two_way=two_way),),
+        contacts=(mca.Contact(slave=surfaces[0], master=surfaces[1], two_way=two_way, penalty=1.0),),
         fixed=(mca.Fixed(body="wall", nodes="ymin"),),
         impact=mca.ImpactPhase(duration=1e-4 / speed + 2e-4, output_interval=2e-6),
     )
