@@ -11,6 +11,7 @@ from impacts import finished, result_of
 
 import warp_mca as mca
 from warp_mca.kernels.records.columns import MADE
+from warp_mca.physics.contact import stiffness
 from warp_mca.watch import ledger
 
 E, RHO, SIDE = 70e9, 2700.0, 0.01
@@ -73,9 +74,16 @@ def slope(angle: float, tolerance: float = 0.01, mu: float = 0.4) -> mca.Scene:
     )
 
 
+@pytest.fixture
+def stiff(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Springs of flat ends three times as stiff as by default, which gain energy."""
+    monkeypatch.setattr(stiffness, "FLAT", 2.0)
+
+
 @pytest.mark.parametrize(
     "given", [{}, {"gap": 1.3e-7}, {"mu": 0.3}, {"two_way": True}, {"two_way": False, "mu": 0.2, "nu": 0.3}]
 )
+@pytest.mark.usefixtures("stiff")
 def test_springs_book_what_they_make_as_they_close_and_open(given: dict):
     """All of the imbalance: other forces do the work of their energies to the square of a step's strain."""
     impact = finished(bar(**given), precision="float64")
@@ -88,6 +96,7 @@ def test_springs_book_what_they_make_as_they_close_and_open(given: dict):
     assert np.abs(net - (made - made[0])).max() < 0.01 * np.abs(made).max()
 
 
+@pytest.mark.usefixtures("stiff")
 def test_a_cube_that_gains_energy_at_its_flat_end_runs_on_and_says_so():
     result, finer = mca.run(cube()), mca.run(cube(scale=0.2))
     said = [any("closed and opened within steps" in warning for warning in r.warnings) for r in (result, finer)]
@@ -105,6 +114,7 @@ def test_a_strict_tolerance_or_a_given_penalty_has_no_allowance(tolerance: float
         mca.run(scene)
 
 
+@pytest.mark.usefixtures("stiff")
 def test_more_than_ten_times_the_tolerance_stops_the_run(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(ledger, "MOST_MADE", 2.0)
     with pytest.raises(mca.GuardError, match="of which contact springs made"):
@@ -114,11 +124,12 @@ def test_more_than_ten_times_the_tolerance_stops_the_run(monkeypatch: pytest.Mon
 @pytest.mark.parametrize(
     ("scene", "rings"),
     [
-        (bar((20, 2)), True),
-        (bar((8, 1), element="tet4"), True),
-        (bar((15, 3), nu=0.3, two_way=True), True),
+        (bar((20, 2), penalty=2.0), True),
+        (bar((8, 1), element="tet4", penalty=1.0), True),
+        (bar((15, 3), nu=0.3, two_way=True, penalty=1.0), True),
+        (bar((15, 3), nu=0.3, two_way=True), False),
         (bar((20, 2), penalty=0.1), False),  # so soft that the force rises slowly
-        (dataclasses.replace(bar((20, 2)), joints=(mca.Weld(name="W", body="bar", nodes="xmax"),)), False),
+        (dataclasses.replace(bar((20, 2), penalty=2.0), joints=(mca.Weld(name="W", body="bar", nodes="xmax"),)), False),
     ],
 )
 def test_a_force_above_that_of_waves_is_said_to_ring(scene: mca.Scene, rings: bool):
@@ -135,7 +146,7 @@ def test_a_force_above_that_of_waves_is_said_to_ring(scene: mca.Scene, rings: bo
         assert result.F_n[inside].mean() == pytest.approx(RHO * C * SIDE**2 / pair, rel=0.05)  # as it says
 
 
-@pytest.mark.parametrize(("angle", "creeps"), [(0.25, True), (0.35, True), (0.5, False), (0.0, False)])
+@pytest.mark.parametrize(("angle", "creeps"), [(0.25, True), (0.32, True), (0.5, False), (0.0, False)])
 def test_a_block_at_rest_that_creeps_is_said_to(angle: float, creeps: bool):
     """Below the angle of friction, 0.38, it should rest; above it slides, with g (sin - mu cos) t."""
     result = mca.run(slope(angle))
@@ -154,6 +165,7 @@ def test_a_block_at_rest_that_creeps_is_said_to(angle: float, creeps: bool):
         assert speed == pytest.approx(expected, rel=0.1)
 
 
+@pytest.mark.usefixtures("stiff")
 def test_a_creeping_block_that_is_stopped_is_said_to_slide(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(ledger, "MOST_MADE", 1.0)
     with pytest.raises(mca.GuardError, match=r"contact springs made .* whose nodes slide a little each time"):

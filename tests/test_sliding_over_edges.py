@@ -150,7 +150,7 @@ def test_a_block_that_strikes_a_side_just_below_its_edge_is_thrown_back(below: f
     scene = mca.Scene(
         name="strike",
         bodies=(block, wall),
-        contacts=(mca.Contact(slave=surfaces[0], master=surfaces[1], two_way=two_way),),
+        contacts=(mca.Contact(slave=surfaces[0], master=surfaces[1], two_way=two_way, penalty=1.0),),
         fixed=(mca.Fixed(body="wall", nodes="ymin"),),
         impact=mca.ImpactPhase(duration=1e-4 / speed + 2e-4, output_interval=2e-6),
     )

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from impacts import prepared
@@ -23,6 +24,7 @@ from watched import history, ledger, of_contacts, told, told_of
 
 import warp_mca as mca
 from warp_mca.geometry import Mesh
+from warp_mca.physics.contact import stiffness
 from warp_mca.watch import (
     bending,
     contacts,
@@ -193,7 +195,8 @@ def _(beyond: bool) -> list[str]:
 
 @pair(energy.energy_of_switching)
 def _(beyond: bool) -> list[str]:
-    return run(flat_cube(scale=0.9 if beyond else 0.2))
+    with patch.object(stiffness, "FLAT", 2.0):
+        return run(flat_cube(scale=0.9 if beyond else 0.2))
 
 
 @pair(energy.turned_edge)

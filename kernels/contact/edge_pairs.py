@@ -9,9 +9,10 @@ REACH = 0.5  # greatest depth, as a share of the size of the smaller faces besid
 _PARALLEL = 1e-4  # square of the sine between edges that do not cross, at most
 _OUTSIDE = 0.05  # sine by which the normal may lie outside those of the faces beside an edge; twice that once pressed
 _SLACK = 1e-4  # growth of the depth in a step allowed beyond the motion, as a share of an edge
-_BEGUN = 0.02  # depth by which a crossing that goes on between other edges may be deeper, as a share of an edge
+_BEGUN = 2e-3  # depth to which edges may lie in each other when their crossing begins, as a share of an edge
+_MORE = 0.02  # depth by which a crossing that goes on between other edges may be deeper, as a share of an edge
 _NEAR = 0.1  # distance along an edge from a crossing within which an end may meet a face, as a share of an edge
-_CLEAR = 0.02  # distance in front of a face at which such an end does not, as a share of an edge, at least
+_CLEAR = 1e-3  # distance in front of a face at which such an end does not, as a share of an edge, at least
 _END = 0.01  # share of an edge by which a crossing that presses may lie off its ends, until another goes on
 
 
@@ -137,12 +138,21 @@ def crossing(
 
 
 @wp.func
-def may_begin(depth: wp.float64, held: wp.float64, moved: wp.float64, size: wp.float64) -> bool:
-    """Whether edges can have come to this depth in a step, from the depth `held` of a crossing that goes on here."""
-    slack = wp.float64(_SLACK) * size
-    if held > wp.float64(0.0):
-        slack = held + wp.float64(_BEGUN) * size
-    return depth <= slack + wp.float64(2.0) * wp.abs(moved)
+def goes_on(depth: wp.float64, held: wp.float64, moved: wp.float64, size: wp.float64) -> bool:
+    """Whether edges can have come to this depth in a step from the depth `held` of a crossing that goes on here."""
+    return depth <= held + wp.float64(_MORE) * size + wp.float64(2.0) * wp.abs(moved)
+
+
+@wp.func
+def resting_depth(depth: wp.float64, approach: wp.float64, size: wp.float64) -> wp.float64:
+    """Depth at which a new crossing is free of force [m]: 0, more if edges are deeper than they move in a step, or -1.
+
+    So are edges of which a node met a face until now. Deeper ones do not begin: they are far sides of thin bodies.
+    """
+    rest = wp.float64(0.0)
+    if depth > wp.float64(2.0) * wp.abs(approach) + wp.float64(_SLACK) * size:
+        rest = wp.where(depth < wp.float64(_BEGUN) * size, depth - wp.max(approach, rest), wp.float64(-1.0))
+    return rest
 
 
 @wp.func

@@ -10,14 +10,15 @@ from warp_mca.kernels.contact.edge_pairs import (
     SLOTS,
     SkinEdges,
     crossing,
+    goes_on,
     lies_clear,
-    may_begin,
     pair_factor,
+    resting_depth,
     share_an_end,
 )
 from warp_mca.kernels.contact.laws import Laws
 from warp_mca.kernels.contact.search import TOO_DEEP
-from warp_mca.kernels.contact.spring import Spring, open_function, spring_function
+from warp_mca.kernels.contact.spring import Spring, open_function, rest_function, spring_function
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 from warp_mca.kernels.records.extremes import add_normal_force
 
@@ -33,6 +34,7 @@ class Met:
         before: the spring whose crossing goes on here, itself if it did, or -1 for a new crossing.
         taken: the spring that takes this one's crossing over, or NOBODY.
         weight, normal, gap, du: as in `Crossing`.
+        rest: depth at which a spring that begins is free of force [m].
         force, tangential, stiffness, energy: of the spring `before` in the last step [N], [N/m], [J].
     """
 
@@ -43,6 +45,7 @@ class Met:
     normal: wp.array(dtype=wp.vec3d)
     gap: wp.array(dtype=wp.float64)
     du: wp.array(dtype=wp.vec3d)
+    rest: wp.array(dtype=wp.float64)
     force: wp.array(dtype=wp.vec3d)
     tangential: wp.array(dtype=wp.vec3d)
     stiffness: wp.array(dtype=wp.float64)
@@ -129,15 +132,20 @@ def meet_kernel() -> Any:
             if hit.touches:
                 size = wp.min(slave.size[a], master.size[b])
                 before = place
-                begins = may_begin(-hit.gap, wp.float64(0.0), hit.approach, size)
-                if place < 0 and begins:
-                    begins = lies_clear(X, u, slave, a, master, b, hit.weight[1], size)
-                    if begins:
-                        begins = lies_clear(X, u, master, b, slave, a, hit.weight[3], size)
-                elif place < 0:
+                begins = place >= 0
+                rest = wp.float64(0.0)
+                if place < 0:
                     before = predecessor(X, u, v, slave, master, chains, a, b, hit.normal, spring)
-                if before >= 0:
-                    begins = may_begin(-hit.gap, spring.held[before], hit.approach, size)
+                    if before >= 0:
+                        begins = goes_on(-hit.gap, spring.held[before], hit.approach, size)
+                        rest = spring.rest[before]
+                    else:
+                        rest = resting_depth(-hit.gap, hit.approach, size)
+                        begins = rest >= wp.float64(0.0)
+                        if begins:
+                            begins = lies_clear(X, u, slave, a, master, b, hit.weight[1], size)
+                        if begins:
+                            begins = lies_clear(X, u, master, b, slave, a, hit.weight[3], size)
                 if begins and place < 0:
                     for s in range(end - 1, begin - 1, -1):
                         if spring.face[s] < 0 and met_out.edge[s] < 0:
@@ -149,6 +157,7 @@ def meet_kernel() -> Any:
                     met_out.normal[place] = hit.normal
                     met_out.gap[place] = hit.gap
                     met_out.du[place] = hit.du
+                    met_out.rest[place] = rest
                     if before >= 0 and before != place:
                         wp.atomic_min(met_out.taken, before, place)
                         met_out.force[place] = spring.force[before]
@@ -163,6 +172,7 @@ def meet_kernel() -> Any:
 def press_kernel(friction: bool, each: bool, laws: Laws) -> Any:
     """Kernel: force of each spring, from spring `first` on: those that `meet_kernel` found edges for, others open."""
     press, open_contact = spring_function(friction, laws), open_function(friction, laws)
+    gap_from_rest = rest_function(True)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
@@ -203,8 +213,11 @@ def press_kernel(friction: bool, each: bool, laws: Laws) -> Any:
                     b = int(-1)
         if b >= 0:
             gap = met.gap[s]
+            if met.before[s] != s:
+                spring.rest[s] = met.rest[s]
+            pressed = gap_from_rest(s, gap, spring)
             stiffness = wp.min(k_old, factor * master.stiffness[b])
-            _, F_n = press(s, gap, met.normal[s], met.du[s], k_old, stiffness, of(mu, k), dt, spring)
+            _, F_n = press(s, pressed, met.normal[s], met.du[s], k_old, stiffness, of(mu, k), dt, spring)
             add_normal_force(k, F_n, of(per_newton, k), normal_force_out)
             spring.face[s] = b
             spring.stiffness[s] = stiffness

@@ -13,6 +13,7 @@ from warp_mca.kernels.elements.hex8_small import stress_functions
 from warp_mca.kernels.elements.hexahedron import LINE_RATIO, LINE_SCALE
 from warp_mca.kernels.elements.patch import POINT, Patches
 from warp_mca.kernels.elements.patch_element import load_functions, material_of
+from warp_mca.kernels.elements.viscosity import viscosity_function
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.hardware.shared_memory import ROW, row_functions, shared_functions, warp_barrier
 from warp_mca.kernels.materials.laws import FLOW_HISTORY, law_functions, row_count
@@ -148,8 +149,8 @@ def point_functions(precision: str, law_name: str) -> tuple[Any, Any, Any, Any]:
 
 
 @cache
-def flow_function(precision: str, law_name: str) -> Any:
-    """The function by which four lanes compute an element of a patch."""
+def flow_function(precision: str, law_name: str, viscous: bool = False) -> Any:
+    """The function by which four lanes compute an element of a patch, of which the first keeps bulk viscosity."""
     t = scalars(precision)
     R, mat33 = t.real, t.mat33
     point = POINT[precision]
@@ -160,7 +161,17 @@ def flow_function(precision: str, law_name: str) -> Any:
     size, last = HISTORY_SIZE, HISTORY_SIZE - 1
     read_row, write_row = row_functions(precision, 2 * size)
     keep_strain, _, strain_square = keep_functions(R)
-    scale = LINE_SCALE**3
+    scale, viscous_pressure = LINE_SCALE**3, viscosity_function(precision, False)
+
+    @wp.func
+    def pressure_of(K: R, dilatation: R, volume: R, e: int, first: bool, dt: R, extreme_out: wp.array2d(dtype=R)):
+        pressure = R(scale) * K * dilatation / volume
+        if wp.static(viscous):
+            own = R(0.0)
+            if first:  # of the lanes
+                own = viscous_pressure(e, dilatation / volume, R(scale) * volume, dt, extreme_out)
+            pressure = pressure + R(scale) * lane_sum(own)
+        return pressure
 
     @wp.func
     def flow(
@@ -171,6 +182,7 @@ def flow_function(precision: str, law_name: str) -> Any:
         patches: Patches,
         e: int,
         law: wp.array2d(dtype=R),
+        dt: R,
         thread: int,
         q: int,
         valid: bool,
@@ -196,7 +208,8 @@ def flow_function(precision: str, law_name: str) -> Any:
         lx0, lx1, ly0, ly1, lz = to_point_lines(add_transposed(d0, W, x0 + d0), add_transposed(d1, W, x1 + d1), xi, eta)
         b00, b01, b02, det0, sums0 = shape_of_point(gx0, gy0, gz, lx0, ly0, lz)
         b10, b11, b12, det1, sums1 = shape_of_point(gx1, gy1, gz, lx1, ly1, lz)
-        pressure = R(scale) * law[m, 0] * lane_sum(wp.trace(sums0) + wp.trace(sums1)) / lane_sum(det0 + det1)
+        dilatation = lane_sum(wp.trace(sums0) + wp.trace(sums1))
+        pressure = pressure_of(law[m, 0], dilatation, lane_sum(det0 + det1), e, valid and q == 0, dt, extreme_out)
         S0, eps0, p0, trial0 = stress_of_point(sums0, det0, law, m, history, 0)
         S1, eps1, p1, trial1 = stress_of_point(sums1, det1, law, m, history, size)
         largest = lane_max(wp.max(trial0, trial1))
@@ -206,15 +219,9 @@ def flow_function(precision: str, law_name: str) -> Any:
         if flows:
             write_row(history_of_points(eps0, p0, eps1, p1), 2 * size * q, e, history_out)
         Fz = force_of_edge(S0, pressure, b02) + force_of_edge(S1, pressure, b12)
-        f0, f1 = to_corners(
-            force_of_edge(S0, pressure, b00),
-            force_of_edge(S1, pressure, b10),
-            force_of_edge(S0, pressure, b01),
-            force_of_edge(S1, pressure, b11),
-            Fz,
-            xi,
-            eta,
-        )
+        Fx0, Fx1 = force_of_edge(S0, pressure, b00), force_of_edge(S1, pressure, b10)
+        Fy0, Fy1 = force_of_edge(S0, pressure, b01), force_of_edge(S1, pressure, b11)
+        f0, f1 = to_corners(Fx0, Fx1, Fy0, Fy1, Fz, xi, eta)
         f0 = add_product(f0, W, f0)
         f1 = add_product(f1, W, f1)
         if valid:

@@ -13,6 +13,7 @@ from warp_mca.kernels.elements.hex8_small import small_strain_function
 from warp_mca.kernels.elements.hexahedron import LINE_SCALE, frame_functions
 from warp_mca.kernels.elements.patch_element import load_functions, sum_functions
 from warp_mca.kernels.elements.patch_kernel import PatchElement, list_element, patch_force_kernel
+from warp_mca.kernels.elements.viscosity import DILATATION, TAKEN, VISCOUS_PRESSURE
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.shared_memory import ROW
 from warp_mca.kernels.records.extremes import keep_functions
@@ -21,14 +22,14 @@ wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def element(precision: str, law_name: str) -> PatchElement:
-    """A thread's element as if elastic, and listed if it yields."""
+def element(precision: str, law_name: str, viscous: bool = False) -> PatchElement:
+    """A thread's element as if elastic, and listed if it yields: lanes then compute its bulk viscosity, too."""
     t = scalars(precision)
     R, mat33, mat83 = t.real, t.mat33, t.mat83
-    plastic, flow = bool(law_name), flow_function(precision, law_name)
+    plastic, flow = bool(law_name), flow_function(precision, law_name, viscous)
     load_points, load_displacements, _ = load_functions(precision)
     element_rotation, local_displacement = frame_functions(precision)
-    element_forces = small_strain_function(precision, "")
+    element_forces = small_strain_function(precision, "", viscous)
     _, keep_forces, *_ = sum_functions(precision)
     keep_strain, keep_volume, strain_square = keep_functions(R)
     scale = LINE_SCALE**3
@@ -42,6 +43,7 @@ def element(precision: str, law_name: str) -> PatchElement:
         m: int,
         lane: int,
         law: wp.array2d(dtype=R),
+        dt: R,
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
         extreme_out: wp.array2d(dtype=R),
@@ -51,8 +53,11 @@ def element(precision: str, law_name: str) -> PatchElement:
         G = R(scale) * law[m, 1]
         local = local_displacement(Xl, ul, W)
         K = R(scale) * law[m, 0]
-        none = R(0.0)  # time step
-        f, largest = element_forces(Xl, local, W, K, G, e, m, law, none, yielded_out, history_out, extreme_out)
+        if wp.static(plastic and viscous):
+            theta = extreme_out[DILATATION, e]
+            pressure = extreme_out[VISCOUS_PRESSURE, e]
+            taken = extreme_out[TAKEN, e]
+        f, largest = element_forces(Xl, local, W, K, G, e, m, law, dt, yielded_out, history_out, extreme_out)
         keep_forces(force_out, lane, f)
         keep_strain(e, strain_square(largest, G), extreme_out)
         yields = bool(False)
@@ -60,6 +65,10 @@ def element(precision: str, law_name: str) -> PatchElement:
             if R(3.0) * largest > R(scale) * R(scale) * law[m, 2] * law[m, 2]:
                 yields = bool(True)
                 yielded_out[e] = 1
+                if wp.static(viscous):  # lanes compute the element again
+                    extreme_out[DILATATION, e] = theta
+                    extreme_out[VISCOUS_PRESSURE, e] = pressure
+                    extreme_out[TAKEN, e] = taken
         return yields
 
     @wp.func
@@ -70,7 +79,7 @@ def element(precision: str, law_name: str) -> PatchElement:
 
     @wp.func
     def prepare(
-        Xl: mat83, ul: mat83, e: int, lane: int, extreme_out: wp.array2d(dtype=R), force_out: wp.array(dtype=R)
+        Xl: mat83, ul: mat83, e: int, lane: int, _dt: R, extreme_out: wp.array2d(dtype=R), force_out: wp.array(dtype=R)
     ):
         W, J = element_rotation(Xl, ul)
         keep_volume(e, R(1.0) - J, extreme_out)
@@ -84,6 +93,7 @@ def element(precision: str, law_name: str) -> PatchElement:
         m: int,
         lane: int,
         law: wp.array2d(dtype=R),
+        dt: R,
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
         extreme_out: wp.array2d(dtype=R),
@@ -96,7 +106,7 @@ def element(precision: str, law_name: str) -> PatchElement:
         if wp.static(plastic):
             flows = yielded_out[e] != 0
         if not flows:
-            flows = elastic_element(Xl, ul, W, e, m, lane, law, yielded_out, history_out, extreme_out, force_out)
+            flows = elastic_element(Xl, ul, W, e, m, lane, law, dt, yielded_out, history_out, extreme_out, force_out)
         if wp.static(plastic):
             if flows:
                 list_element(lane, listed_out)

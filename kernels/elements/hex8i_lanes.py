@@ -15,6 +15,7 @@ from warp_mca.kernels.elements.internal_modes import PLANE, mode_functions, plac
 from warp_mca.kernels.elements.patch import POINT, Patches
 from warp_mca.kernels.elements.patch_element import material_of
 from warp_mca.kernels.elements.patterns import VOLUME_SCALE, mean_functions
+from warp_mca.kernels.elements.viscosity import VISCOUS_PRESSURE
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.hardware.shared_memory import ROW, row_functions, warp_barrier
 from warp_mca.kernels.materials.laws import law_functions
@@ -159,7 +160,7 @@ def sums_function(precision: str) -> Any:
 
 
 @cache
-def flow_function(points: int, precision: str, law_name: str) -> Any:
+def flow_function(points: int, precision: str, law_name: str, viscous: bool = False) -> Any:
     """The function by which two lanes compute an element of a patch."""
     R, point = scalars(precision).real, POINT[precision]
     _, _, vector_sum, lane_max = lane_functions(precision)
@@ -187,6 +188,7 @@ def flow_function(points: int, precision: str, law_name: str) -> Any:
         patches: Patches,
         e: int,
         law: wp.array2d(dtype=R),
+        _dt: R,
         thread: int,
         lane: int,
         valid: bool,
@@ -232,6 +234,8 @@ def flow_function(points: int, precision: str, law_name: str) -> Any:
         if lane_max(wp.where(flows, R(1.0), R(0.0))) > R(0.0) and lane == 0:
             wp.atomic_add(extreme_out, LAG_LOSS, e, volume * lost)  # which waits for nothing
         Q = conjugate(x, volume, y, R0, R1, R2, p, w)
+        if wp.static(viscous):
+            pressure = pressure + extreme_out[VISCOUS_PRESSURE, e]
         if valid:
             store_lane_forces(x, b, volume, W, whole(mean, pressure), Q, right, lane, thread, force_out)
         return flows

@@ -12,6 +12,7 @@ from warp_mca.kernels.elements.internal_modes import mode_functions
 from warp_mca.kernels.elements.patch_element import pattern_load_functions, sum_functions
 from warp_mca.kernels.elements.patch_kernel import PatchElement, list_element, patch_force_kernel
 from warp_mca.kernels.elements.patterns import corner_force_function, pattern_strain_function
+from warp_mca.kernels.elements.viscosity import viscosity_function
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.shared_memory import ROW
 from warp_mca.kernels.records.extremes import keep_functions
@@ -42,22 +43,26 @@ def keep_function(precision: str) -> Any:
 
 
 @cache
-def element(points: int, precision: str, law_name: str) -> PatchElement:
-    """A thread's element as if elastic, and listed if it yields."""
+def element(points: int, precision: str, law_name: str, viscous: bool = False) -> PatchElement:
+    """A thread's element as if elastic, and listed if it yields: lanes then add the viscous pressure that is kept."""
     t = scalars(precision)
     R, mat73 = t.real, t.mat73
-    plastic, flow = bool(law_name), flow_function(points, precision, law_name)
+    plastic, flow = bool(law_name), flow_function(points, precision, law_name, viscous)
     load_patterns, load_displacement_patterns = pattern_load_functions(precision)
     shape_and_strain, corner_forces = pattern_strain_function(precision, False), corner_force_function(precision)
     frame, elastic_stress = mode_functions(precision).frame, elastic_function(precision, points)
-    keep = keep_function(precision)
+    keep, viscous_pressure = keep_function(precision), viscosity_function(precision, False)
     _, keep_forces, *_ = sum_functions(precision)
     keep_strain, keep_volume, strain_square = keep_functions(R)
 
     @wp.func
-    def prepare(x: mat73, du: mat73, e: int, lane: int, extreme_out: wp.array2d(dtype=R), force_out: wp.array(dtype=R)):
-        _b, _volume, W, H, J, q = shape_and_strain(x, du)
+    def prepare(
+        x: mat73, du: mat73, e: int, lane: int, dt: R, extreme_out: wp.array2d(dtype=R), force_out: wp.array(dtype=R)
+    ):
+        _b, volume, W, H, J, q = shape_and_strain(x, du)
         keep_volume(e, R(1.0) - J, extreme_out)
+        if wp.static(viscous):
+            viscous_pressure(e, wp.trace(H), volume, dt, extreme_out)
         keep(H, q, W, lane, force_out)
 
     @wp.func
@@ -68,6 +73,7 @@ def element(points: int, precision: str, law_name: str) -> PatchElement:
         m: int,
         lane: int,
         law: wp.array2d(dtype=R),
+        dt: R,
         yielded_out: wp.array(dtype=wp.int32),
         _history: wp.array2d(dtype=R),
         extreme_out: wp.array2d(dtype=R),
@@ -76,12 +82,17 @@ def element(points: int, precision: str, law_name: str) -> PatchElement:
     ):
         b, volume, W, H, J, q = shape_and_strain(x, du)
         keep_volume(e, R(1.0) - J, extreme_out)
+        if wp.static(viscous):
+            pressure = viscous_pressure(e, wp.trace(H), volume, dt, extreme_out)
         flows = bool(False)
         if wp.static(plastic):
             flows = yielded_out[e] != 0
         if not flows:
             G = law[m, 1]
             P, Q, largest = elastic_stress(x, volume, H, q, frame(x), law[m, 0], G)
+            if wp.static(viscous):
+                for i in range(3):
+                    P[i, i] += pressure
             keep_forces(force_out, lane, corner_forces(x, b, volume, W, P, Q))
             keep_strain(e, strain_square(largest, G), extreme_out)
             if wp.static(plastic):

@@ -15,15 +15,15 @@ wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def element(precision: str, law_name: str) -> PatchElement:
-    """Stress, plastic flow and forces."""
+def element(precision: str, law_name: str, viscous: bool = False) -> PatchElement:
+    """Stress, bulk viscosity, plastic flow and forces."""
     t = scalars(precision)
     R, mat73 = t.real, t.mat73
     load_patterns, load_displacement_patterns = pattern_load_functions(precision)
     _, keep_forces, *_ = sum_functions(precision)
     _, keep_volume, _ = keep_functions(R)
     shape_and_strain, corner_forces = pattern_strain_function(precision, False), corner_force_function(precision)
-    stress_and_flow = stress_function(precision, law_name, False)
+    stress_and_flow = stress_function(precision, law_name, False, viscous)
 
     @wp.func
     def compute_element(
@@ -33,6 +33,7 @@ def element(precision: str, law_name: str) -> PatchElement:
         m: int,
         lane: int,
         law: wp.array2d(dtype=R),
+        dt: R,
         yielded_out: wp.array(dtype=wp.int32),
         history_out: wp.array2d(dtype=R),
         extreme_out: wp.array2d(dtype=R),
@@ -40,7 +41,7 @@ def element(precision: str, law_name: str) -> PatchElement:
         force_out: wp.array(dtype=R),
     ):
         b, volume, W, H, J, q = shape_and_strain(x, du)
-        P, Q = stress_and_flow(x, volume, H, q, e, m, law, R(0.0), yielded_out, history_out, extreme_out)
+        P, Q = stress_and_flow(x, volume, H, q, e, m, law, dt, yielded_out, history_out, extreme_out)
         keep_forces(force_out, lane, corner_forces(x, b, volume, W, P, Q))
         keep_volume(e, R(1.0) - J, extreme_out)
 

@@ -42,8 +42,8 @@ wp.set_module_options({"enable_backward": False})
 class Patches:
     """Patches of a block of elements.
 
-    A head of a patch is its first element, its first slot, (slots << 16) + (exponent << 8) + elements, and its number;
-    see `warp_mca.physics.elements.patches`.
+    A head of a patch is its first element, its first slot, (level << 25) + (slots << 16) + (exponent << 8) + elements,
+    and its number; see `warp_mca.physics.elements.patches`.
 
     Attributes:
         head: of each patch, shape (patch_count,), vec4i.
@@ -52,12 +52,14 @@ class Patches:
             (4, element_count), uint32.
         places: element of the patch whose corner of each number lies in a slot, a byte each, NOWHERE where none does,
             shape (slot_count,), vec2i.
+        dt: time step of level 0, which viscous elements read [s].
     """
 
     head: wp.array(dtype=wp.vec4i)
     turn: wp.array(dtype=wp.vec4i)
     corner: wp.array2d(dtype=wp.uint32)
     places: wp.array(dtype=wp.vec2i)
+    dt: wp.float64
 
 
 @wp.kernel(enable_backward=False)
@@ -104,7 +106,13 @@ def element_count(head: wp.vec4i):
 @wp.func
 def slot_count(head: wp.vec4i):
     """Slots of a patch."""
-    return (head[2] >> 16) & 0xFFFF
+    return (head[2] >> 16) & 0x1FF
+
+
+@wp.func
+def step_of(patches: Patches, head: wp.vec4i):
+    """Time step of the elements of a patch [s]."""
+    return wp.float64(1 << (head[2] >> 25)) * patches.dt
 
 
 @wp.func

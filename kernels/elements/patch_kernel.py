@@ -21,6 +21,7 @@ from warp_mca.kernels.elements.patch import (
     corners_of,
     element_count,
     exponent_of,
+    step_of,
 )
 from warp_mca.kernels.elements.patch_element import material_of, sum_functions
 from warp_mca.kernels.elements.patch_layout import PATCH, SLOTS
@@ -48,9 +49,10 @@ class PatchElement:
     Attributes:
         name: of the element.
         load_points, load_displacements: as those of `patch_element.load_functions`; what they give goes to `compute`.
-        compute: (points, displacements, e, m, lane, law, yielded_out, history_out, extreme_out, listed_out, force_out);
-            stores the element's forces, or lists it.
-        prepare: (points, displacements, e, lane, extreme_out, force_out); stores what lanes need of a thread's element.
+        compute: (points, displacements, e, m, lane, law, dt, yielded_out, history_out, extreme_out, listed_out,
+            force_out); stores the element's forces, or lists it.
+        prepare: (points, displacements, e, lane, dt, extreme_out, force_out); stores what lanes need of a thread's
+            element.
         flow: computes an element that may yield by several threads, see `hex8_lanes`; None where `compute` does it all.
         lanes: how many threads `flow` takes [-].
     """
@@ -64,7 +66,7 @@ class PatchElement:
     lanes: int = 1
 
 
-Maker = Callable[[str, str], PatchElement]  # of a precision and a law
+Maker = Callable[[str, str, bool], PatchElement]  # of a precision, a law, and whether elements are viscous
 
 
 @wp.func
@@ -100,7 +102,10 @@ def listed_function(precision: str, flow: Any, lanes: int) -> Any:
             valid = item < listed
             grid = exponent_of(head)
             q = lane & wp.static(lanes - 1)
-            flow(points, pool, first, grid, patches, mine, law, thread, q, valid, history_out, extreme_out, force_out)
+            dt = R(step_of(patches, head))
+            flow(
+                points, pool, first, grid, patches, mine, law, dt, thread, q, valid, history_out, extreme_out, force_out
+            )
         if listed > 0:
             barrier()
             if lane == 0:
@@ -110,13 +115,13 @@ def listed_function(precision: str, flow: Any, lanes: int) -> Any:
 
 
 @cache
-def patch_force_kernel(maker: Maker, precision: str, law_name: str) -> Any:
-    """Kernel: the forces of each patch on its nodes and, where there is a law, the plastic history.
+def patch_force_kernel(maker: Maker, precision: str, law_name: str, viscous: bool = False) -> Any:
+    """Kernel: the forces of each patch on its nodes, bulk viscosity and, where there is a law, the plastic history.
 
     flowing_out has the number of elements of each patch that took the return map, shape (patch_count,), where the
     element has lanes for these.
     """
-    own = maker(precision, law_name)
+    own = maker(precision, law_name, viscous)
     load_points, load_displacements, compute_element = own.load_points, own.load_displacements, own.compute
     name = f"{own.name}_patch_force"
     t = scalars(precision)
@@ -171,7 +176,7 @@ def patch_force_kernel(maker: Maker, precision: str, law_name: str) -> Any:
         while element_count(head) > 0:
             e = from_start(head[0] + lane)
             m = material_of(corners[0], corners[1])
-            first = (k & 1) * wp.static(slots)
+            first, dt = (k & 1) * wp.static(slots), R(step_of(patches, head))
             Xl = load_points(kept_points, pool, corners, first, exponent_of(head))
             ul = load_displacements(pool, corners, first)
             next_head = ring[(k + 1) % wp.static(HEADS)]
@@ -181,7 +186,7 @@ def patch_force_kernel(maker: Maker, precision: str, law_name: str) -> Any:
             if wp.static(early):
                 copy_nodes(X, u, kept_points, next_head, lane, wp.static(slots) - first, pool)
             if lane < element_count(head):
-                compute_element(Xl, ul, e, m, lane, law, yielded_out, history_out, extreme_out, listed, forces)
+                compute_element(Xl, ul, e, m, lane, law, dt, yielded_out, history_out, extreme_out, listed, forces)
             wait_for_copies()
             barrier()
             if wp.static(lanes):

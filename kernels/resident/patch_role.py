@@ -41,14 +41,14 @@ ROUNDS = (max(SLOTS.values()) + THREADS - 1) // THREADS  # slots of a thread
 
 
 @cache
-def element_role(maker: Maker, precision: str, law_name: str) -> Any:
+def element_role(maker: Maker, precision: str, law_name: str, viscous: bool) -> Any:
     """The function that computes the elements of a patch by all threads of a block.
 
     Elements with a plastic law are computed as those that yield, whether they do or not.
     """
     t = scalars(precision)
     R, point = t.real, POINT[precision]
-    plastic, own = bool(law_name), maker(precision, law_name)
+    plastic, own = bool(law_name), maker(precision, law_name, viscous)
     lanes, shift = own.lanes, own.lanes.bit_length() - 1
     load_points, load_displacements, compute, prepare, flow = (
         own.load_points,
@@ -79,11 +79,12 @@ def element_role(maker: Maker, precision: str, law_name: str) -> Any:
             Xl = load_points(points, pool, corners, 0, exponent_of(head))
             ul = load_displacements(pool, corners, 0)
             if wp.static(plastic):
-                prepare(Xl, ul, e, lane, extreme_out, force_out)
+                prepare(Xl, ul, e, lane, R(patches.dt), extreme_out, force_out)
             else:
                 m = material_of(corners[0], corners[1])
                 none = wp.array(ptr=wp.uint64(0), shape=(0,), dtype=wp.int32)  # of elements that yield
-                compute(Xl, ul, e, m, lane, law, yielded_out, history_out, extreme_out, none, force_out)
+                dt = R(patches.dt)
+                compute(Xl, ul, e, m, lane, law, dt, yielded_out, history_out, extreme_out, none, force_out)
         if wp.static(plastic):
             barrier()
             for batch in range((wp.static(lanes) * count + wp.static(THREADS - 1)) // wp.static(THREADS)):
@@ -92,8 +93,8 @@ def element_role(maker: Maker, precision: str, law_name: str) -> Any:
                 e = from_start(head[0] + thread)
                 q, valid = lane & wp.static(lanes - 1), item < count
                 if flow(
-                    points, pool, 0, exponent_of(head), patches, e, law, thread, q, valid, history_out, extreme_out,
-                    force_out,
+                    points, pool, 0, exponent_of(head), patches, e, law, R(patches.dt), thread, q, valid,
+                    history_out, extreme_out, force_out,
                 ):  # fmt: skip
                     yielded_out[e] = 1
         barrier()
@@ -126,7 +127,7 @@ def see_function(precision: str, turned: bool) -> Any:
 
 
 @cache
-def patch_role(maker: Maker, precision: str, law_name: str, turned: bool) -> Any:
+def patch_role(maker: Maker, precision: str, law_name: str, viscous: bool, turned: bool) -> Any:
     """The function that computes the forces of a patch in each of the kernel's steps.
 
     `turned`, in `mixed`: elements compute in floating frames.
@@ -138,7 +139,7 @@ def patch_role(maker: Maker, precision: str, law_name: str, turned: bool) -> Any
     point, slots, mixed = POINT[precision], SLOTS[precision], precision == "mixed"
     copy_points = copy_functions(precision)[3]
     clear_nowhere, _, _, sum_slot = sum_functions(precision)
-    compute_elements, see_slots = element_role(maker, precision, law_name), see_function(precision, turned)
+    compute_elements, see_slots = element_role(maker, precision, law_name, viscous), see_function(precision, turned)
 
     @wp.func
     def compute_patch(

@@ -54,6 +54,7 @@ def resident_kernel(
     maker: Maker,
     precision: str,
     law_name: str,
+    viscous: bool,
     turned: bool,
     contact: bool,
     friction: bool,
@@ -65,12 +66,16 @@ def resident_kernel(
     """Kernel: take `steps` steps of a model of one block of hexahedra, with contact if `contact`, pins if `coupled`.
 
     Arguments are those of the kernels that take the same steps one by one: `patch_kernel`, `contact`, `nodes.node`,
-    `nodes.constraint`, `nodes.couple`. `turned`: elements compute in floating frames. count_out are the counts of
-    `meeting`, zero before and after. `maker` makes the element, see `patch_kernel.PatchElement`.
+    `nodes.constraint`, `nodes.couple`. `viscous`: elements have bulk viscosity; `turned`: they compute in floating
+    frames. count_out are the counts of `meeting`, zero before and after. `maker` makes the element, see
+    `patch_kernel.PatchElement`.
     """
     t = scalars(precision)
     R, vec3, point = t.real, t.vec3, POINT[precision]
-    compute_patch, move_free = patch_role(maker, precision, law_name, turned), free_role(precision, contact, turned)
+    compute_patch, move_free = (
+        patch_role(maker, precision, law_name, viscous, turned),
+        free_role(precision, contact, turned),
+    )
     touch_slaves, move_masters = contact_role(friction, stress_free, contact_laws), master_role(precision, turned)
     move_bound, move_pinned = bound_role(precision, partial, turned), pin_role(precision, turned)
 

@@ -79,6 +79,11 @@ class CellType:
         own, whole = CELL_TYPES[self.stored_as], CELL_TYPES[self.linear or self.stored_as]
         return (len(whole.faces) / len(own.faces)) ** 1.5
 
+    @property
+    def face_height(self) -> float:
+        """Height of a cell over its face, over volume by area [-]: 3 of a pointed cell."""
+        return 3.0 if (self.linear or self.name) == "tetrahedron" else 1.0
+
     @cached_property
     def own_corners(self) -> list[int]:
         """First corner of the stored cell at which each corner of this one stands."""

@@ -97,7 +97,7 @@ class Assembly:
         cells: the elements by formulation and strain measure.
         materials: those of the scene; `material` is each element's index among them.
         K, G: moduli [Pa] of each element; rho: its density [kg/m^3], see `densities`; volume: of its mesh [m^3].
-        face_depth: of the type of each element, as `CellType.face_depth` [-], shape (element_count,).
+        face_depth, face_height: of the type of each element, as in `CellType` [-], shape (element_count,).
         rigid: whether each element belongs to a rigid body, and is not computed, shape (element_count,), bool.
         mass: lumped masses [kg], shape (node_count,).
         relief: divisor of each node's mass in eigenvalues [-], shape (node_count,), see `TiedNodes.relief`; None
@@ -128,13 +128,14 @@ class Assembly:
         self.K = np.array([m.bulk_modulus for m in self.materials])[self.material]
         self.G = np.array([m.shear_modulus for m in self.materials])[self.material]
         self.rho = np.concatenate([densities(body, meshes[body.name]) for body in scene.bodies])
-        self.volume, self.face_depth = np.empty(elements), np.ones(elements)
+        self.volume, self.face_depth, self.face_height = np.empty(elements), np.ones(elements), np.ones(elements)
         self.mass = np.zeros(nodes)
         self.element_mass = []
         for part in self.cells:
             mass = element_masses(part, self.X, self.rho)
             self.volume[part.index] = mass.sum(axis=1) / self.rho[part.index]
-            self.face_depth[part.index] = CELL_TYPES[part.element.cell].face_depth
+            kind = CELL_TYPES[part.element.cell]
+            self.face_depth[part.index], self.face_height[part.index] = kind.face_depth, kind.face_height
             self.element_mass.append(mass)
             self.mass += sum_to_nodes(part.conn, mass, nodes)
 
@@ -232,7 +233,7 @@ class Assembly:
         node, element = self.meshes[surface.body].surface(surface.nodes)
         node = (node + self.node_start[surface.body]).astype(np.int32)
         element = (element + self.element_start[surface.body]).astype(np.int32)
-        return make_faces(self.X, node, element, self.K, self.G, self.volume * self.face_depth)
+        return make_faces(self.X, node, element, self.K, self.G, self.volume * self.face_depth, self.face_height)
 
     def nearest(self, point: Point | None) -> int:
         """Node nearest to a point, or GROUND.

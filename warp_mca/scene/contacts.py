@@ -104,9 +104,10 @@ class Contact(_Springs):
         slave: surface whose nodes are kept out of the master.
         master: surface of another body, or a rigid plane.
         mu: coefficient of friction [-], the one at rest where `friction` has laws; 0 runs no friction at all.
-        penalty: factor f of the penalty stiffness k = f K A^2 / V [-]. None takes k = c E / (1 - nu^2) A^2 / V, with
-            c = 3.8 where a surface is curved and 0.76 where both are flat: at nu = 0.3 that is f = 5 and f = 1. "auto"
-            chooses f from mesh, curvature, mass and speed, so that springs hold at most some 7 % of the energy.
+        penalty: factor f of the penalty stiffness k = f K A^2 / V [-]. None takes E / (1 - nu^2) in place of K, and
+            f = 3.8 where a surface is curved. Where both are flat, nodes share, by their area, springs that are as
+            stiff as 1.5 cells of each surface, so that flat ends do not ring. "auto" chooses f from mesh, curvature,
+            mass and speed, so that springs hold at most some 7 % of the energy.
         law: force along the normal over depth and stiffness; the linear spring k g by default.
         friction: law that changes the limit mu F_n of the friction force, or several that do in turn, as
             (DecayingFriction(kinetic=0.2, decay=2.0), ShearCap(tau_max=1e8)); Coulomb's limit by default.

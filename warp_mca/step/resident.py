@@ -115,6 +115,7 @@ class Resident:
             patches.maker,
             solver.precision,
             block.law,
+            block.viscous,
             solver.nodes.kind.turned,
             contact is not None,
             friction,
@@ -142,6 +143,7 @@ class Resident:
         slaves, master, faces, spring = _contact(solver, state)
         self.nodes.data, force = solver.nodes.given(state)
         assert isinstance(elements, PatchStage)
+        elements.patches.dt = elements.dt
         inputs = [self.roles, steps, work.X, elements.point, elements.patches, work.law, elements.slot, self.nodes]
         inputs += [slaves, master, faces, self.bonds, self.clusters, solver.dt, spring]
         outputs = [self.count, own.yielded, own.history, own.extreme, force, state.normal_force]

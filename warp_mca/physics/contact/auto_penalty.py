@@ -19,7 +19,8 @@ import numpy as np
 
 from warp_mca.base.arrays import Array
 from warp_mca.model.assembly import Assembly
-from warp_mca.physics.contact.surfaces import FLAT, Faces
+from warp_mca.physics.contact.stiffness import FLAT, nearest_faces
+from warp_mca.physics.contact.surfaces import Faces
 from warp_mca.scene import Contact, RigidPlane, Surface
 
 SHARE = 0.067  # of the energy that springs may hold, by estimate: some 2 % of the force peak
@@ -88,7 +89,7 @@ def chosen_penalty(
     parts: Assembly, contact: Contact, slave: Faces, master: Faces | None, velocity: Array
 ) -> ChosenPenalty:
     """The penalty of a contact that leaves it to the program; `velocity` of the nodes [m/s], shape (node_count, 3)."""
-    own, other, normal = _nearest(parts.X, contact, slave, master)
+    own, other, normal = _nearest(contact, slave, master)
     sides = [own] if other is None else [own, other]
     found = [side.moduli(parts.K) for side in sides]
     default = FLAT * min(modulus / bulk for modulus, bulk, _ in found)
@@ -123,21 +124,16 @@ def settled(
     return replace(contact, penalty=chosen.penalty), chosen
 
 
-def _nearest(X: Array, contact: Contact, slave: Faces, master: Faces | None) -> tuple[_Side, _Side | None, Array]:
+def _nearest(contact: Contact, slave: Faces, master: Faces | None) -> tuple[_Side, _Side | None, Array]:
     """Where the surfaces are nearest to each other, and the unit normal there, which points to the slave."""
+    own, other = nearest_faces(contact, slave, master)
     if master is None:
         assert isinstance(contact.master, RigidPlane)
         normal = np.asarray(contact.master.normal, dtype=float)
-        normal = normal / np.linalg.norm(normal)
-        lowest = (X[slave.node] @ normal).min(axis=1)
-        near = lowest <= lowest.min() + 1e-9 * np.ptp(X, axis=0).max()
-        return _Side(slave, int(np.flatnonzero(near)[(slave.middle[near] @ normal).argmin()])), None, normal
-    from scipy.spatial import KDTree
-
-    distance, face = (np.asarray(found) for found in KDTree(master.middle).query(slave.middle))
-    k = int(np.argmin(distance))
-    normal = master.normal[face[k]] / np.linalg.norm(master.normal[face[k]])
-    return _Side(slave, k), _Side(master, int(face[k])), normal
+    else:
+        normal = master.normal[other]
+    normal = normal / np.linalg.norm(normal)
+    return _Side(slave, own), None if master is None else _Side(master, other), normal
 
 
 def _yielding(parts: Assembly, name: str, place: Array, normal: Array) -> float:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from warp_mca.base.arrays import Array, Index
-from warp_mca.physics.contact.surfaces import ContactPass, Faces, node_mean
+from warp_mca.physics.contact.stiffness import node_mean
+from warp_mca.physics.contact.surfaces import ContactPass, Faces
 
 
 def contact_eigenvalues(item: ContactPass, slave: Faces, master: Faces | None, mass: Array) -> tuple[Index, Array]:

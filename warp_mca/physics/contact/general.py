@@ -11,7 +11,8 @@ from warp_mca.base.arrays import Array, Index
 from warp_mca.physics.contact.pairs import SLOTS, Pairs
 from warp_mca.physics.contact.sides import is_curved
 from warp_mca.physics.contact.skin_edges import edge_eigenvalues, general_edges
-from warp_mca.physics.contact.surfaces import CURVED, FLAT, LONGEST_LIST, ContactPass, Faces, node_mean, surface_pass
+from warp_mca.physics.contact.stiffness import CURVED, FLAT, node_mean
+from warp_mca.physics.contact.surfaces import LONGEST_LIST, ContactPass, Faces, surface_pass
 from warp_mca.scene import ContactAll, Surface
 
 if TYPE_CHECKING:
@@ -35,11 +36,11 @@ def general_passes(parts: Assembly, contact: ContactAll, index: int) -> tuple[li
     curved = [is_curved(skin.node, skin.normal) for skin in skins]
     for one, other in pairs:
         a, b = number[one], number[other]
-        default = CURVED if a != b and (curved[a] or curved[b]) else FLAT
+        default = CURVED if a != b and (curved[a] or curved[b]) else 0.5 * FLAT  # two equal layers in series
         factor[a, b] = factor[b, a] = 0.5 * (default if contact.penalty is None else float(contact.penalty))
     union = Faces(*(np.concatenate([getattr(skin, name) for skin in skins]) for name in Faces.__dataclass_fields__))
     own = union.contact if contact.penalty is None else union.bulk
-    item = surface_pass(contact, index, union, union, 1.0, own, own, 0.0)
+    item = surface_pass(contact, index, union, union, node_mean(union.nodes, union, own), own, 0.0)
     slave_of = np.concatenate([np.full(len(skin.nodes), k) for k, skin in enumerate(skins)])
     order = np.argsort(np.concatenate([skin.nodes for skin in skins]))
     face_of = np.concatenate([np.full(len(skin.node), k) for k, skin in enumerate(skins)])

@@ -12,7 +12,8 @@ from warp_mca.base.arrays import Array, Index
 from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.kernels.contact.edge_pairs import SLOTS
 from warp_mca.physics.contact.sides import SHARP, neighbours
-from warp_mca.physics.contact.surfaces import ContactPass, Faces, spring_stiffness
+from warp_mca.physics.contact.stiffness import spring_stiffness
+from warp_mca.physics.contact.surfaces import ContactPass, Faces
 from warp_mca.scene import Contact
 
 BLUNT = math.radians(3.0)  # angle between the faces beside an edge from which on it may press another
@@ -153,8 +154,8 @@ def edge_pass(X: Array, first: ContactPass, slave: Faces, master: Faces, contact
     kept, met = _kept(mine, theirs), _kept(theirs, mine)
     if not (kept.any() and met.any()):
         return None
-    factor, own, other = spring_stiffness(replace(contact, two_way=False), slave, master)
-    return _pass(first, slave, master, mine.some(kept), theirs.some(met), factor * own, factor * other)
+    (_, own), (_, other) = spring_stiffness(replace(contact, two_way=False), slave, master)
+    return _pass(first, slave, master, mine.some(kept), theirs.some(met), own, other)
 
 
 def general_edges(X: Array, first: ContactPass, union: Faces, own: Array) -> EdgePass | None:

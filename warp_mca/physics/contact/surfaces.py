@@ -13,6 +13,7 @@ from warp_mca.geometry.cell_types import is_triangle
 from warp_mca.physics.contact.friction_laws import friction_values
 from warp_mca.physics.contact.pairs import SLOTS, Pairs
 from warp_mca.physics.contact.sides import find_sides, is_curved, stiffest_fold
+from warp_mca.physics.contact.stiffness import node_mean, spring_stiffness
 from warp_mca.scene import Contact, ContactAll, RigidPlane
 from warp_mca.scene.contact_laws import law_values
 
@@ -22,9 +23,6 @@ Index = NDArray[np.int32]
 SEARCH_MARGIN = 0.25  # margin of the search for faces, as a share of the edge of the smallest face
 LIST_LENGTH = 32  # faces near a slave node, and slave nodes near a face at least; a full list stops the run
 LONGEST_LIST = 4096  # slave nodes near a face at most
-# Default spring stiffness over E* A^2 / V, with E* = E / (1 - nu^2): at nu = 0.3 as penalty = 1 and 5. Few nodes carry
-# a curved contact, so softer springs lower its force peak; see docs/measurements/methods.md.
-FLAT, CURVED = 0.7583, 3.792
 
 
 @dataclass(frozen=True)
@@ -40,6 +38,7 @@ class Faces:
         middle: mean of the corners [m], shape (face_count, 3), float64.
         bulk: K A^2 / V of each face [N/m], shape (face_count,), float64.
         contact: E* A^2 / V of each face, with E* = E / (1 - nu^2) [N/m], shape (face_count,), float64.
+        layer: E* A / d of each face, with the height d of its cell over it [N/m], shape (face_count,), float64.
     """
 
     node: Index
@@ -49,6 +48,7 @@ class Faces:
     middle: Array
     bulk: Array
     contact: Array
+    layer: Array
 
     @property
     def nodes(self) -> Index:
@@ -147,44 +147,22 @@ def face_geometry(X: Array, face: Index) -> tuple[Array, Array]:
     return np.linalg.norm(normal, axis=1), normal
 
 
-def make_faces(X: Array, face: Index, element: Index, K: Array, G: Array, volume: Array) -> Faces:
+def make_faces(
+    X: Array, face: Index, element: Index, K: Array, G: Array, volume: Array, height: Array | None = None
+) -> Faces:
     """Faces with the penalty stiffness K A^2 / V of Hallquist (LS-DYNA theory manual, contact, Eq. 26.6).
 
     Args:
         X: positions [m], shape (node_count, 3). face: shape (face_count, 4). element: of each face.
         K, G: bulk and shear modulus [Pa] and volume: [m^3] of every element, shape (element_count,).
+        height: of every element over its faces, over volume by area [-], shape (element_count,); None: 1 for all.
     """
     area, normal = face_geometry(X, face)
     K, G, volume = K[element], G[element], volume[element]
     contact = 4.0 * G * (3.0 * K + G) / (3.0 * K + 4.0 * G)  # E / (1 - nu^2)
     middle = X[face].mean(axis=1)
-    return Faces(face, element, area, normal, middle, K * area**2 / volume, contact * area**2 / volume)
-
-
-def spring_stiffness(contact: Contact, slave: Faces, master: Faces | None) -> tuple[float, Array, Array]:
-    """Penalty stiffness as a factor [-] times that of each face of the slave and of the master [N/m].
-
-    A number f gives f K A^2 / V. The default takes E* in place of K, so that it suits any Poisson's ratio, and is
-    stiffer where one of the surfaces is curved. Two passes of one contact have half of it each.
-    """
-    surfaces = [slave] if master is None else [slave, master]
-    if contact.penalty is None:
-        factor = CURVED if any(is_curved(faces.node, faces.normal) for faces in surfaces) else FLAT
-        found = [faces.contact for faces in surfaces]
-    else:
-        assert not isinstance(contact.penalty, str)  # `auto_penalty.settled` has replaced it
-        factor, found = contact.penalty, [faces.bulk for faces in surfaces]
-    return 0.5 * factor if contact.two_way else factor, found[0], found[-1]
-
-
-def node_mean(nodes: Index, faces: Faces, value: Array) -> Array:
-    """Mean over the faces around each node of a value given on faces."""
-    total = np.zeros(nodes[-1] + 1)
-    count = np.zeros(nodes[-1] + 1)
-    for corner in range(4):
-        np.add.at(total, faces.node[:, corner], value)
-        np.add.at(count, faces.node[:, corner], 1.0)
-    return total[nodes] / count[nodes]
+    bulk, own = K * area**2 / volume, contact * area**2 / volume
+    return Faces(face, element, area, normal, middle, bulk, own, own if height is None else own / height[element])
 
 
 def _room(slave: Faces, master: Faces, margin: float) -> int:
@@ -212,16 +190,9 @@ def _faces_around(nodes: Index, face: Index) -> tuple[Index, Index]:
 
 
 def surface_pass(
-    contact: Contact | ContactAll,
-    index: int,
-    slave: Faces,
-    master: Faces,
-    factor: float,
-    own: Array,
-    other: Array,
-    sign: float,
+    contact: Contact | ContactAll, index: int, slave: Faces, master: Faces, own: Array, other: Array, sign: float
 ) -> ContactPass:
-    """A pass in which faces of the master have `factor` times the stiffness `other`, slave nodes the mean of `own`."""
+    """A pass in which nodes of the slave have the stiffness `own`, and faces of the master `other` [N/m]."""
     nodes, masters = slave.nodes, master.nodes
     margin = SEARCH_MARGIN * float(np.sqrt(master.area.min()))
     longest = float(np.sqrt(master.area.max()))
@@ -230,8 +201,8 @@ def surface_pass(
     slave_offset, around_slave = _faces_around(nodes, slave.node)
     return ContactPass(
         slave=nodes,
-        stiffness=factor * node_mean(nodes, slave, own),
-        face_stiffness=factor * other,
+        stiffness=own,
+        face_stiffness=other,
         mu=contact.mu,
         **law_values(contact.law, 0.5 * longest),
         **friction_values(contact, slave),
@@ -264,7 +235,7 @@ def contact_passes(contact: Contact, index: int, slave: Faces, master: Faces | N
     The spring of a slave node has the stiffness of the node's own faces or of the master face that it touches,
     whichever is lower; `kernels.contact.contact` says what happens where the node slides on to a softer face.
     """
-    factor, own, other = spring_stiffness(contact, slave, master)
+    own, *other = spring_stiffness(contact, slave, master)
     if master is None:
         assert isinstance(contact.master, RigidPlane)
         nodes = slave.nodes
@@ -272,7 +243,7 @@ def contact_passes(contact: Contact, index: int, slave: Faces, master: Faces | N
         return [
             ContactPass(
                 slave=nodes,
-                stiffness=factor * node_mean(nodes, slave, own),
+                stiffness=own[0],
                 slave_face=slave.node,
                 mu=contact.mu,
                 **law_values(contact.law, deepest),
@@ -284,7 +255,7 @@ def contact_passes(contact: Contact, index: int, slave: Faces, master: Faces | N
                 initial_overlap=contact.initial_overlap,
             )
         ]
-    passes = [surface_pass(contact, index, slave, master, factor, own, other, 1.0)]
+    passes = [surface_pass(contact, index, slave, master, own[0], other[0][1], 1.0)]
     if contact.two_way:
-        passes.append(surface_pass(contact, index, master, slave, factor, other, own, -1.0))
+        passes.append(surface_pass(contact, index, master, slave, other[0][0], own[1], -1.0))
     return passes

@@ -54,9 +54,9 @@ class PatchStage(ElementStage):
     ) -> None:
         """Allocate; `patch_kernels` makes the force kernel and the element, other arguments as `ElementStage`."""
         super().__init__(block, precision, kernels, points)
-        self.force_kernel = patch_kernels.force_kernel(precision, block.law)
+        self.force_kernel = patch_kernels.force_kernel(precision, block.law, block.viscous)
         self.maker = patch_kernels.element
-        own = self.maker(precision, block.law)
+        own = self.maker(precision, block.law, block.viscous)
         self.lanes = own.lanes if own.flow else 0
         mixed = precision == "mixed"
         ends, size = (*block.ends, *block.part_ends), patch_size(block.conn.shape[1], wp.get_device().sm_count)
@@ -64,7 +64,7 @@ class PatchStage(ElementStage):
         host = make_patches(block.conn, ends, SLOTS[precision], X if mixed else None, size, halved)
         point, exponent = grid_points(X, host) if mixed else (host.node, np.zeros(len(host.start) - 1, dtype=np.int32))
         self.slot_node = host.node
-        heads = host.heads(exponent)
+        heads = host.heads(exponent, block.level_ends)
         self.patches = patch.Patches()
         self.patches.head = wp.array(heads, dtype=wp.vec4i)
         self.most = wp.get_device().sm_count * patch.RESIDENT[precision]
@@ -143,6 +143,7 @@ class PatchStage(ElementStage):
         patches = self.patches if level is None or chain is None else self.chains[level, chain]
         most = min(self.blocks, self.beside) if chain else self.blocks
         blocks = min(most, len(patches.head))
+        patches.dt = self.dt
         inputs = [work.X, self.point, patches, work.law, work.displacements(state), self.slot, blocks]
         outputs = [own.yielded, own.history, own.extreme, self.flowing, work.force]
         wp.launch(self.force_kernel, blocks * PATCH, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
@@ -151,7 +152,7 @@ class PatchStage(ElementStage):
 def hexahedral_stage(
     block: Block, X: Array, precision: str, kernels: Any, patch_kernels: Any, points: int
 ) -> ElementStage:
-    """By patches on a GPU at small strain; else, viscous, or with a general law one by one; arguments as there."""
-    if block.viscous or block.finite or law_functions(block.law, precision).general or not wp.get_device().is_cuda:
+    """By patches on a GPU at small strain; else, or with a general law, one by one; arguments as there."""
+    if block.finite or law_functions(block.law, precision).general or not wp.get_device().is_cuda:
         return ElementStage(block, precision, kernels, points)
     return PatchStage(block, X, precision, kernels, patch_kernels, points)

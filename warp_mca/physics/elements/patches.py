@@ -111,15 +111,17 @@ class Patches:
     corner: NDArray[np.uint16]
     places: NDArray[np.uint8]
 
-    def heads(self, exponent: Index) -> Index:
+    def heads(self, exponent: Index, level_ends: Sequence[int] = ()) -> Index:
         """Header of each patch for its block of threads, shape (patch_count, 4), int32.
 
-        First element, first slot, (slots << 16) + (exponent << 8) + elements, and number.
+        First element, first slot, (level << 25) + (slots << 16) + (exponent << 8) + elements, and number.
 
         Args:
             exponent: of each patch's grid, as `grid_points` has it, shape (patch_count,), int32.
+            level_ends: of the elements, as in `Block`.
         """
-        counts = (np.diff(self.slot_start) << 16) + (exponent << 8) + np.diff(self.start)
+        level = np.searchsorted(np.asarray(level_ends[:-1], dtype=np.int64), self.start[:-1], side="right")
+        counts = (level << 25) + (np.diff(self.slot_start) << 16) + (exponent << 8) + np.diff(self.start)
         return np.column_stack([self.start[:-1], self.slot_start[:-1], counts, np.arange(len(counts))]).astype(np.int32)
 
     def words(self, material: Index) -> NDArray[np.uint32]:
