@@ -125,7 +125,7 @@ def row(n: int, m: int, merged: bool, v: float, element: str = mca.Body.element,
     [
         (2, 2, 3.0, {}),
         pytest.param(2, 2, 3.0, {"two_way": True}, marks=BY_CHANCE),
-        (5, 4, 3.0, {}),
+        pytest.param(5, 4, 3.0, {}, marks=BY_CHANCE),
         pytest.param(4, 2, 10.0, {"two_way": True, "element": "hex8"}, marks=BY_CHANCE),
         (2, 2, 3.0, {"mu": 0.1}),
     ],
