@@ -54,7 +54,7 @@ def boxes(element: str = "hex8", gap: float = 1e-3, speed: float = 20.0, **more:
 def test_bodies_without_a_contact_do_not_go_through_each_other_unseen():
     (warning,) = said(mca.run(boxes()), "went into each other")
     assert warning.startswith("large and small went into each other from t = 7.2e-05 s on, up to 0.004 m deep at (")
-    assert warning.endswith("take all of the surface, such as nodes='boundary', in a Contact")
+    assert warning.endswith("take contacts='all', or all of the surface, such as nodes='boundary', in a Contact")
     sides = [mca.Surface(body=name, nodes="boundary") for name in ("small", "large")]
     scene = boxes(contacts=(mca.Contact(slave=sides[0], master=sides[1]),))
     careful = replace(scene, impact=replace(scene.impact, time_step_scale=0.5))

@@ -26,7 +26,11 @@ BEND = 0.25  # of the gap between parts of a body that its nodes move out of sha
 SLENDER = 8.0  # lengths over thickness from which on a body without gaps may meet itself
 ROOM = 1.5  # times the reach of the place where bound bodies meet at the start: there they may overlap
 
-APART = "no contact keeps them out there; take contacts='all', or the whole surface, as nodes='boundary', in a Contact"
+BELOW = "no contact keeps them out there; take all of the surface, such as nodes='boundary', in a Contact"
+APART = (
+    "no contact keeps them out there; take contacts='all', or all of the surface, such as nodes='boundary', in a "
+    "Contact"
+)
 PARTS = "no contact keeps them apart; take contacts='all', or a ContactAll beside the contacts that are listed"
 BETWEEN = (
     "contact keeps only nodes of a slave out of its master, and edges pass between them; let nodes lie closer where "
@@ -104,7 +108,7 @@ class BelowPlane(Case):
 
     kept_out: Mask
     plane: RigidPlane
-    remedies = APART, APART
+    remedies = BELOW, BELOW
 
     def found(self, look: Look, least: float) -> Found:
         """The deepest node below the plane, if it is deeper than `least` [m]."""

@@ -17,8 +17,8 @@ from warp_mca.kernels.records.columns import PASS, PASS_COLUMNS
 from warp_mca.physics.contact.contact_state import ContactState
 from warp_mca.physics.contact.dashpots import check_dashpots
 from warp_mca.physics.contact.friction_laws import friction_rows
-from warp_mca.physics.contact.pairs import SLOTS, device_pairs
-from warp_mca.physics.contact.per_scene import numbers, per_scene, vectors
+from warp_mca.physics.contact.pairs import SLOTS
+from warp_mca.physics.contact.per_scene import device_pairs, numbers, per_scene, vectors
 from warp_mca.physics.contact.slave_edges import SlaveEdges, faces_of_slaves, new_springs
 from warp_mca.physics.contact.surfaces import LIST_LENGTH, ContactPass
 from warp_mca.step.threads import CONTACT, Split, whole
