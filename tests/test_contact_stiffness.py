@@ -85,7 +85,7 @@ def test_bars_of_flat_cells_swap_their_speeds(cells: int):
     passage = 0.2 / np.sqrt(210e9 / 7850.0)
     pressed = result.time[result.F_n > 0.5 * 0.5 * 7850.0 * np.sqrt(210e9 / 7850.0) * 4e-4]
     assert pressed[-1] - pressed[0] == pytest.approx(passage, rel=0.05)
-    assert result.summary["contact_duration"] == pytest.approx(passage, rel=0.15 if cells == 10 else 0.05)
+    assert result.summary["contact_duration"] == pytest.approx(passage, rel=0.18 if cells == 10 else 0.05)
 
 
 @pytest.mark.parametrize("target", ["plane", "block"])
@@ -102,7 +102,7 @@ def test_default_on_a_curved_tip_is_near_the_limit_of_stiff_springs(target: str)
 @pytest.mark.parametrize("element", ["hex8i", "wedge6", "tet4", "tet10"])
 @pytest.mark.parametrize("two_way", [False, True])
 def test_flat_surfaces_share_the_stiffness_of_a_layer(element: str, two_way: bool):
-    """2 E* A / (3 d) of the whole end in series with the other's, whatever the cells, by the area around each node."""
+    """E* A / (2 d) of the whole end in series with the other's, whatever the cells, by the area around each node."""
     d, far = (0.01 / 4, 0.01 / 3), replace(STEEL, E=70e9)
     boxes = [grid((0.01, 0.01, 0.01), (k, k, k), "deep" if element == "wedge6" else "") for k in (4, 3)]
     bodies = (
@@ -114,7 +114,7 @@ def test_flat_surfaces_share_the_stiffness_of_a_layer(element: str, two_way: boo
     impact = mca.ImpactPhase(duration=1e-6)
     model = prepared(mca.Scene(name="s", bodies=bodies, contacts=(contact,), impact=impact)).model
     layers = [material.E / (1.0 - 0.3**2) * 1e-4 / depth for material, depth in zip((STEEL, far), d, strict=True)]
-    both = 2.0 / 3.0 / sum(1.0 / layer for layer in layers) / (2.0 if two_way else 1.0)
+    both = 0.5 / sum(1.0 / layer for layer in layers) / (2.0 if two_way else 1.0)
     for item in model.passes:
         finer = 2.0 if element == "tet10" else 1.0  # its nodes are as those of cells of half the size
         assert item.stiffness.sum() == pytest.approx(finer * both, rel=1e-6)

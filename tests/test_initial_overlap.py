@@ -33,8 +33,8 @@ def falling(depth: float, *, plane: bool = False, nodes: str = "ymin", master: s
 
 @pytest.mark.parametrize("plane", [False, True])
 def test_overlap_is_refused_with_place_depth_and_energy(plane: bool, tmp_path: Path):
-    """Springs of 2/3 E* A / d on 1 cm^2 of cells of 2.5 mm, 6.2e9 N/m, hold 31 J, a third of it on cells of 5 mm."""
-    held = r"30\.8" if plane else r"10\.3"
+    """Springs of E* A / (2 d) on 1 cm^2 of cells of 2.5 mm, 4.6e9 N/m, hold 23 J, a third of it on cells of 5 mm."""
+    held = r"23\.1" if plane else r"7\.69"
     pattern = rf"initial_overlap = 'refuse': .*25 of them, up to 0\.0001 m deep at .* would hold {held} J"
     with pytest.raises(mca.RequestError, match=pattern):
         mca.run(falling(1e-4, plane=plane), out=tmp_path / "out", recorders=[UsdFile(tmp_path / "a.usdc")])

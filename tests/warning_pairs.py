@@ -206,7 +206,9 @@ def _(beyond: bool) -> list[str]:
 
 @pair(energy.soft_springs)
 def _(beyond: bool) -> list[str]:
-    return told(energy.soft_springs, scene=stacked(2, 2), shares={"c": over(energy.soft_springs, beyond)})
+    scene = stacked(2, 2)
+    given = replace(scene, contacts=tuple(replace(contact, penalty=1.0) for contact in scene.contacts))
+    return told_of(energy.soft_springs, given, shares={"c": over(energy.soft_springs, beyond)})
 
 
 @pair(energy.lagging_vectors)

@@ -106,7 +106,7 @@ class Contact(_Springs):
         mu: coefficient of friction [-], the one at rest where `friction` has laws; 0 runs no friction at all.
         penalty: factor f of the penalty stiffness k = f K A^2 / V [-]. None takes E / (1 - nu^2) in place of K, and
             f = 3.8 where a surface is curved. Where both are flat, nodes share, by their area, springs that are as
-            stiff as 1.5 cells of each surface, so that flat ends do not ring. "auto" chooses f from mesh, curvature,
+            stiff as two cells of each surface, so that flat ends do not ring. "auto" chooses f from mesh, curvature,
             mass and speed, so that springs hold at most some 7 % of the energy.
         law: force along the normal over depth and stiffness; the linear spring k g by default.
         friction: law that changes the limit mu F_n of the friction force, or several that do in turn, as

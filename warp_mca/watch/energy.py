@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warp_mca.kernels.records.columns import PRESSURE, SPRING_ENERGY
+from warp_mca.physics.contact.surfaces import is_curved_contact
 from warp_mca.physics.elements import ELEMENTS
 from warp_mca.watch.ledger import MIN_EXCHANGE
 from warp_mca.watch.row import Finished, Values, row
@@ -69,9 +70,13 @@ def turned_edge(c: Finished, _: float) -> Iterator[Values]:
     "of the exchanged energy at most",
 )
 def soft_springs(c: Finished, most: float) -> Iterator[Values]:
-    """Energy in the springs of each contact when its force is greatest."""
-    for (name, share), contact in zip(c.shares.items(), c.scene.contacts, strict=True):
-        if share is not None and share > most:
+    """Energy in the springs of each contact when its force is greatest.
+
+    Springs of flat ends are by default as soft as cells: waves that have reached few cells leave them a large share.
+    """
+    curved = {item.contact for item in c.model.passes if is_curved_contact(c.model.X, item)}
+    for k, ((name, share), contact) in enumerate(zip(c.shares.items(), c.scene.contacts, strict=True)):
+        if share is not None and share > most and (contact.penalty is not None or k in curved):
             default = "" if contact.penalty is None else " or leave it to its default"
             yield dict(share=share, name=name, loss=PEAK_LOSS * share, default=default)
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 # Default spring stiffness over E* A / d, with E* = E / (1 - nu^2) and the height d of a cell. Flat ends whose springs
 # are stiffer ring, because they close more quickly than waves leave the first cells. Few nodes carry a curved contact,
 # so that softer springs lower its force peak: at nu = 0.3 it has penalty = 5; see docs/measurements/methods.md.
-FLAT, CURVED = 2.0 / 3.0, 3.792
+FLAT, CURVED = 0.5, 3.792
 
 
 def nearest_faces(contact: Contact, slave: Faces, master: Faces | None) -> tuple[int, int]:
