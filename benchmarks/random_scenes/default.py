@@ -21,6 +21,7 @@ WAVES = 10.0  # times that a wave goes to and fro in the longest body, at least
 HERTZ = 2.5  # times the duration of contact of balls
 ROCKING = 4.0  # times as long, where a body is tilted
 ROWS = 300
+FLAT = 1e-6  # of the width, within which nodes lie equally low
 NORMAL, MIRROR = np.array([0.0, 1.0, 0.0]), np.diag([1.0, -1.0, 1.0])
 
 
@@ -101,7 +102,7 @@ def _geometry(rng: np.random.Generator, kind: str, width: float, cells: int):
 
 
 def _partner(rng: np.random.Generator, what: str, width: float, cells: int, body: mca.Body) -> mca.Body:
-    """The mirror image that comes towards the body, with as many cells or others, or a block at rest below it."""
+    """The mirror image that comes towards the body, with as many cells or others, or a block at rest right below it."""
     if what == "pair":
         factor = rng.uniform(0.5, 2.0) if rng.random() < 0.5 else 1.0
         own = np.diag([1.0, 1.0, -1.0])  # all recipes are symmetric about z = 0
@@ -120,8 +121,11 @@ def _partner(rng: np.random.Generator, what: str, width: float, cells: int, body
         divisions=(count, max(1, count // 2), count),
         origin=(-0.5 * side, 0.0, -0.5 * side),
     )
+    points = Rotation.from_rotvec(body.rotation).apply(body.geometry.build().points) + body.position
+    low = points[:, 1] < points[:, 1].min() + FLAT * width
+    x, _, z = points[low].mean(axis=0).tolist()
     still = (0.0, 0.0, 0.0)
-    return replace(body, name="other", geometry=block, rotation=still, velocity=still, position=(0.0, -width, 0.0))
+    return replace(body, name="other", geometry=block, rotation=still, velocity=still, position=(x, -width, z))
 
 
 def _duration(bodies: list[mca.Body], kind: str, speed: float, gap: float, width: float, tilt: float) -> float:
