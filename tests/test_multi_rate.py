@@ -209,7 +209,8 @@ def test_patches_keep_to_one_level_in_whatever_order(precision: str, monkeypatch
     first, last = int(np.searchsorted(heads[:, 0], block.level_ends[0])), len(heads)
     assert 0 < first < last and block.level_ends[0] in heads[:, 0]
     level = (np.arange(last) >= first).astype(int)
-    assert (stage.slot_level == np.repeat(level, heads[:, 2] >> 16 & 0xFFFF)).all()
+    assert (heads[:, 2] >> 25 == level).all()
+    assert (stage.slot_level == np.repeat(level, heads[:, 2] >> 16 & 0x1FF)).all()
     stage.flowing.assign(np.arange(last) % 3 == 0)
     stage.schedule()
     turn = stage.patches.turn.numpy()[:, 3]

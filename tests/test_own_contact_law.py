@@ -120,7 +120,7 @@ def replace_contact(scene: mca.Scene, **change) -> mca.Scene:
 def test_a_linear_law_gives_the_forces_of_the_penalty(registered: None, mu: float):
     """The block slides from steel on to plastic: springs soften while they are pressed, and lose as much."""
     plastic = mca.Elastic(E=2e9, nu=0.3, rho=1000.0)
-    scene = block_on_plate(PLATE, plastic, speed=200.0, start=0.012, mu=mu)
+    scene = block_on_plate(PLATE, plastic, speed=200.0, start=0.012, mu=mu, penalty=1.0)
     known = mca.run(scene, precision="float64")
     own = mca.run(replace_contact(scene, law=Again()), precision="float64")
     assert own.F_n == pytest.approx(known.F_n, rel=1e-9, abs=1e-9 * known.F_n.max())
