@@ -20,6 +20,7 @@ ENERGY = 0.003  # of all energy, that a plain scene may be off
 IMPULSE = 0.05  # of the first contact, that finer cells may change
 WORDS = {
     "distance between nodes": "nodes of the slave farther apart than the other body is wide",
+    "initial_overlap": "bodies said to overlap at the start, which they do not",
     "in touches of their own": "faint touches",
 }
 LISTED = 40  # seeds that a cell of a table names at most
