@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from impacts import finished
+from impacts import begun, finished
 
 import warp_mca as mca
 from warp_mca.scene import model_file
@@ -176,3 +176,14 @@ def test_with_several_rates() -> None:
     scene = bricks((mca.ContactAll(mu=0.2),))
     one, several = mca.run(scene), mca.run(scene, multi_rate=2)
     assert impulse(several) == pytest.approx(impulse(one), rel=0.02)
+
+
+def test_a_stored_state_goes_on_as_the_run_would(tmp_path) -> None:
+    scene = bricks((mca.ContactAll(mu=0.2),))
+    whole, first, again = finished(scene), begun(scene), begun(scene)
+    first.advance(until=101)
+    first.save(tmp_path / "state.npz")
+    again.load(tmp_path / "state.npz")
+    again.advance()
+    assert np.array_equal(again.state.u.numpy(), whole.state.u.numpy())
+    assert np.array_equal(again.state.contacts[0].slot.numpy(), whole.state.contacts[0].slot.numpy())
