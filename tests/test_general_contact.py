@@ -187,3 +187,12 @@ def test_a_stored_state_goes_on_as_the_run_would(tmp_path) -> None:
     again.advance()
     assert np.array_equal(again.state.u.numpy(), whole.state.u.numpy())
     assert np.array_equal(again.state.contacts[0].slot.numpy(), whole.state.contacts[0].slot.numpy())
+
+
+@pytest.mark.gpu
+@pytest.mark.parametrize("scene", [bricks((mca.ContactAll(mu=0.2),)), balls("all")], ids=["bricks", "balls"])
+def test_a_device_gives_the_motion_of_the_cpu_and_the_same_bits_twice(scene) -> None:
+    cpu, cuda, again = (mca.run(scene, device=device) for device in ("cpu", "cuda:0", "cuda:0"))
+    assert all(np.array_equal(cuda[name], again[name], equal_nan=True) for name in cuda.history)
+    for name in ("F_n_N", "E_kinetic", "E_friction"):
+        assert cuda[name] == pytest.approx(cpu[name], abs=1e-4 * max(np.abs(cpu[name]).max(), 1e-9))
