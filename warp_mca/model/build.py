@@ -55,7 +55,7 @@ def _contacts(
             continue
         slave = parts.faces(contact.slave)
         master = None if isinstance(contact.master, RigidPlane) else parts.faces(contact.master)
-        check_spacing(contact, parts.X, slave, master)
+        check_spacing(contact.sides, contact.two_way, parts.X, slave, master)
         given = contact.penalty not in (None, "auto")
         contact, chosen = settled(parts, contact, slave, master, velocity)
         penalties.append(chosen)

@@ -9,11 +9,9 @@ import numpy as np
 from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.face_projection import project
-from warp_mca.scene import RigidPlane
 
 if TYPE_CHECKING:
     from warp_mca.physics.contact.surfaces import Faces
-    from warp_mca.scene import Contact
 
 
 FLAT = 1e-6  # of the width of a surface, as thin as which it is flat
@@ -22,14 +20,15 @@ CLEARLY = 0.05  # of a width, by which an edge comes nearer to the other body th
 NEAREST = 0.25  # of a width beyond the gap between two bodies: parts so near are those that meet first
 
 
-def check_spacing(contact: Contact, X: Array, slave: Faces, master: Faces | None) -> None:
+def check_spacing(sides: tuple[str, str], two_way: bool, X: Array, slave: Faces, master: Faces | None) -> None:
     """Raise RequestError if bodies are about to pass between slave nodes: only nodes are kept out of the master.
 
     Each edge that is longer than the other body is wide counts by itself: where the bodies lie nearest to each other,
     none may come nearer between its ends than at them. What comes near in a run is the matter of `watch.passing`.
 
     Args:
-        contact: of the scene.
+        sides: bodies of the slave and the master of a contact.
+        two_way: as in `Contact`.
         X: positions [m], shape (node_count, 3).
         slave, master: its surfaces; None for a plane.
 
@@ -39,13 +38,12 @@ def check_spacing(contact: Contact, X: Array, slave: Faces, master: Faces | None
     if master is None:
         return
     found = _unseen(X, slave, master)
-    if found and (not contact.two_way or _unseen(X, master, slave)):
-        assert not isinstance(contact.master, RigidPlane)
+    if found and (not two_way or _unseen(X, master, slave)):
         length, width = found
         raise bad_value(
-            f"Contact.slave.body {contact.slave.body}: distance between nodes [m]",
+            f"Contact.slave.body {sides[0]}: distance between nodes [m]",
             float(f"{length:.4g}"),
-            f"body {contact.master.body} is {width:.4g} m wide and could pass between the nodes unseen: refine the "
+            f"body {sides[1]} is {width:.4g} m wide and could pass between the nodes unseen: refine the "
             "mesh of the slave, or make the finer body the slave",
         )
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warp_mca.base.arrays import Array, Index
+from warp_mca.physics.contact.checks import check_spacing
 from warp_mca.physics.contact.pairs import SLOTS, Pairs
 from warp_mca.physics.contact.sides import is_curved
 from warp_mca.physics.contact.surfaces import CURVED, FLAT, LONGEST_LIST, ContactPass, Faces, node_mean, surface_pass
@@ -33,6 +34,8 @@ def general_pass(parts: Assembly, contact: ContactAll, index: int) -> tuple[Cont
     curved = [is_curved(skin.node, skin.normal) for skin in skins]
     for one, other in pairs:
         a, b = number[one], number[other]
+        if a != b:
+            check_spacing((one, other), True, parts.X, skins[a], skins[b])
         default = CURVED if a != b and (curved[a] or curved[b]) else FLAT
         factor[a, b] = factor[b, a] = 0.5 * (default if contact.penalty is None else float(contact.penalty))
     union = Faces(*(np.concatenate([getattr(skin, name) for skin in skins]) for name in Faces.__dataclass_fields__))
