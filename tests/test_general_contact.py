@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from impacts import finished
+from impacts import begun, finished
 
 import warp_mca as mca
 from warp_mca.scene import model_file
@@ -159,6 +159,13 @@ def test_bodies_that_overlap_at_the_start_are_refused() -> None:
     mca.run(replace(scene, bodies=(*scene.bodies[:2], low), contacts=(mca.ContactAll(initial_overlap="stress_free"),)))
 
 
+def test_bodies_about_to_pass_between_nodes_are_refused() -> None:
+    scene = rods("all")
+    coarse = tuple(replace(body, geometry=replace(body.geometry, axial=1)) for body in scene.bodies)
+    with pytest.raises(mca.RequestError, match="could pass between the nodes unseen"):
+        mca.run(replace(scene, bodies=coarse))
+
+
 def test_in_files_batches_and_threads(tmp_path) -> None:
     scene = bricks((mca.ContactAll(mu=0.2, exclude=[("a", "b")]),))
     alone = mca.run(scene, threads=1)
@@ -177,3 +184,23 @@ def test_with_several_rates() -> None:
     scene = bricks((mca.ContactAll(mu=0.2),))
     one, several = mca.run(scene), mca.run(scene, multi_rate=2)
     assert impulse(several) == pytest.approx(impulse(one), rel=0.02)
+
+
+def test_a_stored_state_goes_on_as_the_run_would(tmp_path) -> None:
+    scene = bricks((mca.ContactAll(mu=0.2),))
+    whole, first, again = finished(scene), begun(scene), begun(scene)
+    first.advance(until=101)
+    first.save(tmp_path / "state.npz")
+    again.load(tmp_path / "state.npz")
+    again.advance()
+    assert np.array_equal(again.state.u.numpy(), whole.state.u.numpy())
+    assert np.array_equal(again.state.contacts[0].slot.numpy(), whole.state.contacts[0].slot.numpy())
+
+
+@pytest.mark.gpu
+@pytest.mark.parametrize("scene", [bricks((mca.ContactAll(mu=0.2),)), balls("all")], ids=["bricks", "balls"])
+def test_a_device_gives_the_motion_of_the_cpu_and_the_same_bits_twice(scene) -> None:
+    cpu, cuda, again = (mca.run(scene, device=device) for device in ("cpu", "cuda:0", "cuda:0"))
+    assert all(np.array_equal(cuda[name], again[name], equal_nan=True) for name in cuda.history)
+    for name in ("F_n_N", "E_kinetic", "E_friction"):
+        assert cuda[name] == pytest.approx(cpu[name], abs=1e-4 * max(np.abs(cpu[name]).max(), 1e-9))

@@ -77,3 +77,11 @@ def test_a_thin_wall_is_not_pressed_by_its_other_side() -> None:
     result = mca.run(scene)
     assert not result.contacts[0].touched
     assert result.history["E_internal"].max() > 0.1 * result.history["E_kinetic"].max()
+
+
+@pytest.mark.gpu
+def test_folds_on_a_device_are_those_of_the_cpu() -> None:
+    scene = press(folded(arms=3, arm=0.003, bend=0.9e-3, cell=0.6e-3), (FOLDED,), 1e-4, 20.0, ("z", "z"))
+    cpu, cuda = (mca.run(scene, device=device) for device in ("cpu", "cuda:0"))
+    assert cpu.contacts[0].touched
+    assert cuda["E_plastic"] == pytest.approx(cpu["E_plastic"], abs=1e-3 * cpu["E_plastic"].max())

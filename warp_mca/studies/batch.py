@@ -19,7 +19,7 @@ from warp_mca.phases.settings import settings_of
 from warp_mca.phases.simulate import simulate
 from warp_mca.results.result import Result
 from warp_mca.results.storage import ALL_FILES, check_output, folder_path, save
-from warp_mca.scene import Scene
+from warp_mca.scene import Contact, ContactAll, Scene
 from warp_mca.scene.options import with_options
 
 Meshes = Mapping[str, Mesh]
@@ -161,25 +161,22 @@ def check_alike(scenes: Sequence[Scene], duration: float | None = None) -> float
             remedy = f"scenes[0] has {len(first.contacts)}; batch scenes with as many contacts"
             raise bad_value(f"number of scenes[{k}].contacts", len(scene.contacts), remedy)
         for i, (contact, wanted) in enumerate(zip(scene.contacts, first.contacts, strict=True)):
-            kinds = (("master", _kind), ("two_way", bool), ("law", _law), ("friction_laws", _laws))
-            for name, kind in kinds:
-                value, other = (kind(getattr(item, name, None)) for item in (contact, wanted))
+            for name, value in _kinds(contact).items():
+                other = _kinds(wanted)[name]
                 if value != other:
                     remedy = f"that of scenes[0] is {other}; batch scenes with contacts of the same kinds"
                     raise bad_value(f"scenes[{k}].contacts[{i}].{name}", value, remedy)
     return span
 
 
-def _kind(master: object) -> str:
-    return "of ContactAll" if master is None else type(master).__name__
-
-
-def _law(law: object) -> str:
-    return type(law).__name__
-
-
-def _laws(laws: Sequence[object]) -> str:
-    return ", ".join(map(_law, laws)) or "mu alone"
+def _kinds(contact: Contact | ContactAll) -> dict[str, object]:
+    """What contacts must have in common, by the name of the field."""
+    return {
+        "master": "of ContactAll" if isinstance(contact, ContactAll) else type(contact.master).__name__,
+        "two_way": contact.two_way,
+        "law": type(contact.law).__name__,
+        "friction_laws": ", ".join(type(law).__name__ for law in contact.friction_laws) or "mu alone",
+    }
 
 
 @contextmanager
