@@ -191,11 +191,6 @@ def _(beyond: bool) -> list[str]:
     return told(energy.imbalance_of_exchange, scene=scene, ledger=ledger(exchange_error=error))
 
 
-@pair(energy.energy_of_switching)
-def _(beyond: bool) -> list[str]:
-    return run(flat_cube(scale=0.9 if beyond else 0.2))
-
-
 @pair(energy.turned_edge)
 def _(beyond: bool) -> list[str]:
     return told(energy.turned_edge, ledger=ledger({"turned": beyond}))

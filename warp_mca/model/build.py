@@ -47,7 +47,6 @@ def _contacts(
         slave = parts.faces(contact.slave)
         master = None if isinstance(contact.master, RigidPlane) else parts.faces(contact.master)
         check_spacing(contact, parts.X, slave, master)
-        given = contact.penalty not in (None, "auto")
         contact, chosen = settled(parts, contact, slave, master, velocity)
         penalties.append(chosen)
         for item in contact_passes(contact, index, slave, master):
@@ -56,7 +55,7 @@ def _contacts(
             nodes, value = contact_eigenvalues(item, sides[0], sides[1], parts.mass)
             np.add.at(added, nodes, bounce_factor(contact, parts.scene) * value)
             decay = item.damping * float(value.max()) / item.stiffening if item.damping else 0.0
-            passes.append(replace(item, penalty_given=given, decay=decay))
+            passes.append(replace(item, decay=decay))
         axes[index] = contact_axes(parts.X, contact, slave, master)
     return tuple(passes), axes, added, tuple(penalties)
 

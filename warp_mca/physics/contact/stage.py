@@ -109,7 +109,7 @@ class ContactStage:
             self._make_planes()
             return
         self.kernel = (
-            contact.surface_kernel(friction, self.each, self.stress_free, self.laws, self.noted)
+            contact.surface_kernel(friction, self.each, self.laws, self.noted)
             if self.sides == 1
             else sides.sided_kernel(friction, self.each, self.sides, self.laws)
         )

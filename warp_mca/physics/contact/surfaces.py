@@ -86,7 +86,6 @@ class ContactPass:
         room: slave nodes that the list of a face holds.
         deepest: penetration of a plane that stops the run [m]; faces have half their own size.
         initial_overlap: as in `Contact`.
-        penalty_given: whether the scene gives a number for the penalty.
     """
 
     slave: Index = field(metadata=of("nodes"))
@@ -117,7 +116,6 @@ class ContactPass:
     room: int = field(default=LIST_LENGTH, metadata=AS_IS)
     deepest: float = field(default=0.0, metadata=AS_IS)
     initial_overlap: str = field(default="refuse", metadata=AS_IS)
-    penalty_given: bool = field(default=False, metadata=AS_IS)
 
     @property
     def smallest_area(self) -> float:
