@@ -179,10 +179,9 @@ def spring_function(friction: bool, laws: Laws) -> Any:
             spring.friction[s] = friction_work + work
             if stick == 1 and mu > wp.float64(0.0):  # a scene of a batch may have no friction
                 spring.stick_impulse[s] = stick_impulse + Fn
-            made = energy_made(s, force, energy, spent, du, spring)
+        made = energy_made(s, force, energy, spent, du, spring)
+        if wp.static(friction):
             spring.tangential[s] = Ft
-        else:
-            made += half * change * wp.dot(du, normal)
         spring.made[s] = made_before + made
         spring.owed[s] = owed + made
         spring.energy[s] = energy
