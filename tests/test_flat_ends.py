@@ -11,8 +11,6 @@ from impacts import finished, result_of
 
 import warp_mca as mca
 from warp_mca.kernels.records.columns import MADE
-from warp_mca.physics.contact import stiffness
-from warp_mca.watch import ledger
 
 E, RHO, SIDE = 70e9, 2700.0, 0.01
 C = math.sqrt(E / RHO)
@@ -74,51 +72,48 @@ def slope(angle: float, tolerance: float = 0.01, mu: float = 0.4) -> mca.Scene:
     )
 
 
-@pytest.fixture
-def stiff(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Springs of flat ends three times as stiff as by default, which gain energy."""
-    monkeypatch.setattr(stiffness, "FLAT", 2.0)
+def imbalance(scene: mca.Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Imbalance of each row over the initial energy, and the part of it that contact springs booked [-]."""
+    own = finished(scene, precision="float64").scene_runs[0].ledger
+    energy = own.energies()
+    work = energy.pop("external_work")
+    made = own.springs(own.table())[..., MADE].sum(axis=1)
+    return (sum(energy.values()) - work) / own.initial_energy - 1.0, (made - made[0]) / own.initial_energy
 
 
 @pytest.mark.parametrize(
     "given", [{}, {"gap": 1.3e-7}, {"mu": 0.3}, {"two_way": True}, {"two_way": False, "mu": 0.2, "nu": 0.3}]
 )
-@pytest.mark.usefixtures("stiff")
-def test_springs_book_what_they_make_as_they_close_and_open(given: dict):
+def test_springs_book_what_they_make(given: dict):
     """All of the imbalance: other forces do the work of their energies to the square of a step's strain."""
-    impact = finished(bar(**given), precision="float64")
-    own = impact.scene_runs[0].ledger
-    energy = own.energies()
-    work = energy.pop("external_work")
-    net = sum(energy.values()) - work - own.initial_energy
-    made = own.springs(own.table())[..., MADE].sum(axis=1)
-    assert np.abs(made).max() > 1e-4 * own.initial_energy
-    assert np.abs(net - (made - made[0])).max() < 0.01 * np.abs(made).max()
+    net, made = imbalance(bar(**given))
+    assert np.abs(made).max() > 1e-6
+    assert np.abs(net - made).max() < 0.01 * np.abs(made).max()
 
 
-@pytest.mark.usefixtures("stiff")
-def test_a_cube_that_gains_energy_at_its_flat_end_runs_on_and_says_so():
-    result, finer = mca.run(cube()), mca.run(cube(scale=0.2))
-    said = [any("closed and opened within steps" in warning for warning in r.warnings) for r in (result, finer)]
-    assert 0.01 < result.summary["energy_error"] < 0.1 and said[0]
-    assert finer.summary["energy_error"] < 0.01 and not said[1]
+@pytest.mark.parametrize("given", [{}, {"mu": 0.3}, {"nu": 0.3}, {"two_way": True}, {"two_way": False}], ids=str)
+def test_energy_does_not_depend_on_where_steps_fall(given: dict):
+    """Springs that close and open within steps took or made up to 4.8 %."""
+    worst = [np.abs(imbalance(bar(**given, gap=share * 4e-7))[0]).max() for share in (0.1, 0.3, 0.5, 0.7, 0.9)]
+    assert max(worst) < 9e-3
+    assert np.mean(worst) < 6e-3
 
 
-@pytest.mark.parametrize(("tolerance", "penalty"), [(1e-3, None), (0.01, 10.0), (0.02, 30.0)])
-def test_a_strict_tolerance_or_a_given_penalty_has_no_allowance(tolerance: float, penalty: float | None):
-    """Springs of a penalty that was asked for can be made softer."""
+def test_a_cube_keeps_its_energy_at_a_flat_end():
+    """It ended with 7.3 % more; while it rattles, its springs owe up to 1.3 %."""
+    net, finer = imbalance(cube()), mca.run(cube(scale=0.09))
+    result = mca.run(cube())
+    assert np.abs(net[0]).max() < 0.015
+    assert abs(net[0][-1]) < 2e-3
+    assert result.F_n.sum() == pytest.approx(finer.F_n.sum(), rel=0.01)
+
+
+@pytest.mark.parametrize(("tolerance", "penalty"), [(1e-4, None), (1e-3, 30.0)])
+def test_a_stop_names_the_contact_that_made_the_energy(tolerance: float, penalty: float | None):
     scene = cube(tolerance=tolerance, penalty=penalty)
-    with pytest.raises(
-        mca.GuardError, match=f"exceeds energy_tolerance = {tolerance} of .*, of which contact springs made"
-    ):
+    says = f"exceeds energy_tolerance = {tolerance:g} of .*, of which contact springs of cube on a plane made"
+    with pytest.raises(mca.GuardError, match=says):
         mca.run(scene)
-
-
-@pytest.mark.usefixtures("stiff")
-def test_more_than_ten_times_the_tolerance_stops_the_run(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(ledger, "MOST_MADE", 2.0)
-    with pytest.raises(mca.GuardError, match="of which contact springs made"):
-        mca.run(cube())
 
 
 @pytest.mark.parametrize(
@@ -163,13 +158,6 @@ def test_a_block_at_rest_that_creeps_is_said_to(angle: float, creeps: bool):
     elif angle:
         expected = 80.0 * (math.sin(angle) - 0.4 * math.cos(angle)) * 0.75 * 0.02
         assert speed == pytest.approx(expected, rel=0.1)
-
-
-@pytest.mark.usefixtures("stiff")
-def test_a_creeping_block_that_is_stopped_is_said_to_slide(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(ledger, "MOST_MADE", 1.0)
-    with pytest.raises(mca.GuardError, match=r"contact springs made .* whose nodes slide a little each time"):
-        mca.run(slope(0.5, mu=0.9))
 
 
 @pytest.mark.parametrize("name", ["sticking_block", "stick_slip"])

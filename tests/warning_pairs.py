@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
-from unittest.mock import patch
 
 import numpy as np
 from impacts import prepared
@@ -24,7 +23,6 @@ from watched import history, ledger, of_contacts, told, told_of
 
 import warp_mca as mca
 from warp_mca.geometry import Mesh
-from warp_mca.physics.contact import stiffness
 from warp_mca.watch import (
     bending,
     contacts,
@@ -191,12 +189,6 @@ def _(beyond: bool) -> list[str]:
     scene = alone(cube(1))
     error = scene.impact.energy_tolerance * (1.01 if beyond else 0.99)
     return told(energy.imbalance_of_exchange, scene=scene, ledger=ledger(exchange_error=error))
-
-
-@pair(energy.energy_of_switching)
-def _(beyond: bool) -> list[str]:
-    with patch.object(stiffness, "FLAT", 2.0):
-        return run(flat_cube(scale=0.9 if beyond else 0.2))
 
 
 @pair(energy.turned_edge)

@@ -20,7 +20,6 @@ KEPT = {
     "exchanged": 1.0,
     "energy_scale": 1.0,
     "energy_error": 0.0,
-    "made": 0.0,
     "imbalance": 0.0,
     "initial_kinetic": 0.0,
     "touched": False,

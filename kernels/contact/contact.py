@@ -22,14 +22,7 @@ LANES = 4  # GPU threads per master node, which share the faces around it
 
 
 @cache
-def surface_kernel(
-    friction: bool,
-    each: bool,
-    stress_free: bool = False,
-    laws: Laws = PLAIN,
-    noted: bool = False,
-    general: bool = False,
-) -> Any:
+def surface_kernel(friction: bool, each: bool, laws: Laws = PLAIN, noted: bool = False, general: bool = False) -> Any:
     """Kernel: push each slave node that penetrates a candidate face back along the normal of that face.
 
     `nearest_face` chooses the face, and `reachable` checks that the node can have come to that depth. The kernel takes
@@ -39,10 +32,10 @@ def surface_kernel(
     The stiffness of a spring is that of the node or of the face that it touches first, whichever is lower. It falls
     where the node slides on to a softer face, and the energy that the spring loses then is booked; it does not rise
     until the spring opens.
-    `stress_free`: springs of bodies that overlap at the start begin without force. `noted`: keep the recent force on
-    each node, which masters with several sides need. `general`: springs have the factors of `Pairs`.
+    `noted`: keep the recent force on each node, which masters with several sides need. `general`: springs have the
+    factors of `Pairs`.
     """
-    settle, let_go = settle_functions(friction, stress_free, laws)
+    settle, let_go = settle_functions(friction, laws)
     pressure = pressure_function(friction)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
     Table = Pairs if general else wp.int32
@@ -78,7 +71,7 @@ def surface_kernel(
         near = nearest_face(X, u, master, s, X[i] + u[i], along)
         held = spring.held[s]
         if near.face >= 0:
-            touch = meet_side(v, master, i, near, stiffness[s], dt, held, along)
+            touch = meet_side(X, u, v, master, i, near, stiffness[s], dt, held, along)
             if wp.static(general):
                 factor = pair_factor(pairs, s, near.face)
                 touch.own *= factor

@@ -29,7 +29,7 @@ def dashpot_function(law: str) -> Any:
         before: wp.vec3d,
         dt: wp.float64,
         spring: Any,
-    ) -> tuple[wp.float64, wp.vec3d]:
+    ) -> tuple[wp.float64, wp.float64]:
         """Add the dashpot to the force F of a spring, which is 0 where the contact opens.
 
         Args:
@@ -37,7 +37,7 @@ def dashpot_function(law: str) -> Any:
             du: motion of the slave relative to the master since then [m].
 
         Returns:
-            The normal force [N]; what the spring alone gave in the last step [N].
+            The normal force [N]; the energy that the dashpot dissipated in this step [J].
         """
         closing = -wp.dot(du, normal)
         D = wp.float64(0.0)
@@ -46,10 +46,8 @@ def dashpot_function(law: str) -> Any:
         kept = spring.dashpot[s]
         pressed = wp.length(before)
         dissipated = wp.float64(0.5) * D * closing
-        elastic = -kept[0] * normal
         if pressed > wp.float64(0.0):
             way = before / pressed
-            elastic = (pressed - kept[0]) * way
             dissipated -= wp.float64(0.5) * kept[0] * wp.dot(way, du)
         elif F > wp.float64(0.0):
             dissipated += wp.float64(0.5) * kept[0] * closing
@@ -57,6 +55,6 @@ def dashpot_function(law: str) -> Any:
             dissipated = spring.normal_energy[s]
             spring.normal_energy[s] = wp.float64(0.0)
         spring.dashpot[s] = wp.vec2d(D, kept[1] + dissipated)
-        return F + D, elastic
+        return F + D, dissipated
 
     return damp

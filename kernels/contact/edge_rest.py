@@ -11,10 +11,11 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.edge_shares import slid_off
-from warp_mca.kernels.contact.edges import Surfaces, area_vector, greatest_stiffness, lies_below, middle, neighbour
+from warp_mca.kernels.contact.edges import Surfaces, greatest_stiffness, neighbour
 from warp_mca.kernels.contact.laws import Laws
 from warp_mca.kernels.contact.nearest import ABOVE, Nearest, edge_of, nearest_face, reachable
 from warp_mca.kernels.contact.pairs import neighbours_spring, same_solid
+from warp_mca.kernels.contact.projection import area_vector, lies_below, middle
 from warp_mca.kernels.contact.settle import Touch, meet, settle_functions
 from warp_mca.kernels.contact.side_choice import NodeSprings
 from warp_mca.kernels.contact.spring import FAR, Spring, pressure_function
@@ -192,7 +193,7 @@ def release_function(friction: bool, sides: int, laws: Laws) -> Any:
 
     It gives the force on the node [N]. `newcomer` is the spring that begins to press the node in this step, or -1.
     """
-    settle, let_go = settle_functions(friction, True, laws)
+    settle, let_go = settle_functions(friction, laws)
     pressure, find_support = pressure_function(friction), support_function(sides)
     Gaps, Faces = wp.types.vector(sides, wp.float64), wp.types.vector(sides, wp.int32)
 

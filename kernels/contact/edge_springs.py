@@ -35,7 +35,7 @@ class Met:
         taken: the spring that takes this one's crossing over, or NOBODY.
         weight, normal, gap, du: as in `Crossing`.
         rest: depth at which a spring that begins is free of force [m].
-        force, tangential, stiffness, energy: of the spring `before` in the last step [N], [N/m], [J].
+        force, tangential, stiffness, energy, owed: of the spring `before` in the last step [N], [N/m], [J].
     """
 
     edge: wp.array(dtype=wp.int32)
@@ -50,6 +50,7 @@ class Met:
     tangential: wp.array(dtype=wp.vec3d)
     stiffness: wp.array(dtype=wp.float64)
     energy: wp.array(dtype=wp.float64)
+    owed: wp.array(dtype=wp.float64)
 
 
 @wp.struct
@@ -164,6 +165,7 @@ def meet_kernel() -> Any:
                         met_out.tangential[place] = spring.tangential[before]
                         met_out.stiffness[place] = spring.stiffness[before]
                         met_out.energy[place] = spring.energy[before]
+                        met_out.owed[place] = spring.owed[before]
 
     return meet_edges
 
@@ -208,6 +210,7 @@ def press_kernel(friction: bool, each: bool, laws: Laws) -> Any:
                     spring.force[s] = met.force[s]
                     spring.tangential[s] = met.tangential[s]
                     spring.energy[s] = met.energy[s]
+                    spring.owed[s] = met.owed[s]
                     spring.face[s] = b
                 else:
                     b = int(-1)
@@ -234,6 +237,8 @@ def press_kernel(friction: bool, each: bool, laws: Laws) -> Any:
                 open_contact(s, dt * du, spring.stiffness[s], spring)
             else:  # another spring has all that it held
                 spring.energy[s] = wp.float64(0.0)
+                spring.normal_energy[s] = wp.float64(0.0)
+                spring.owed[s] = wp.float64(0.0)
                 spring.force[s] = wp.vec3d()
                 spring.tangential[s] = wp.vec3d()
                 spring.face[s] = -1

@@ -4,6 +4,7 @@ import warp as wp
 
 from warp_mca.kernels.contact.nearest import Master
 from warp_mca.kernels.contact.pairs import Pairs, pair_factor
+from warp_mca.kernels.contact.projection import area_vector
 
 
 @wp.struct
@@ -50,53 +51,6 @@ class Surfaces:
 def greatest_stiffness(at: Surfaces, s: int, f: int) -> wp.float64:
     """Penalty stiffness of slave node s on face f: the lower one of both [N/m]."""
     return pair_factor(at.pairs, s, f) * wp.min(at.slaves.stiffness[s], at.master.stiffness[f])
-
-
-@wp.func
-def middle(X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), face: wp.array2d(dtype=wp.int32), f: int):
-    """Mean of the corners of face f [m]."""
-    total = wp.vec3d()
-    for c in range(4):
-        total += X[face[f, c]] + u[face[f, c]]
-    return wp.float64(0.25) * total
-
-
-@wp.func
-def area_vector(X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), face: wp.array2d(dtype=wp.int32), f: int):
-    """Vector along the normal of face f at its middle, whose length is twice the area of the face [m^2]."""
-    across = X[face[f, 2]] + u[face[f, 2]] - X[face[f, 0]] - u[face[f, 0]]
-    return wp.cross(across, X[face[f, 3]] + u[face[f, 3]] - X[face[f, 1]] - u[face[f, 1]])
-
-
-@wp.func
-def lies_below(
-    X: wp.array(dtype=wp.vec3d),
-    u: wp.array(dtype=wp.vec3d),
-    face: wp.array2d(dtype=wp.int32),
-    f: int,
-    g: int,
-    normal: wp.vec3d,
-) -> bool:
-    """Whether the middle of face f is behind face g, whose normal is `normal`: no fold where a node is near both."""
-    return wp.dot(middle(X, u, face, f) - middle(X, u, face, g), normal) < wp.float64(0.0)
-
-
-@wp.func
-def is_edge(
-    X: wp.array(dtype=wp.vec3d),
-    u: wp.array(dtype=wp.vec3d),
-    face: wp.array2d(dtype=wp.int32),
-    f: int,
-    g: int,
-    normal: wp.vec3d,
-) -> bool:
-    """Whether faces f and g share a node and meet at the edge of a solid, not in a fold; `normal` is that of g."""
-    shared = bool(False)
-    for a in range(4):
-        for b in range(4):
-            if face[f, a] == face[g, b]:
-                shared = bool(True)
-    return shared and lies_below(X, u, face, f, g, normal)
 
 
 @wp.func

@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from warp_mca.kernels.contact.projection import interpolate, project_on_face
+from warp_mca.kernels.contact.projection import area_vector, interpolate, is_edge, project_on_face
 from warp_mca.kernels.contact.spring import FAR
 
 # Lengths, as fractions of the edges of a face
@@ -11,6 +11,7 @@ SLACK = 1e-4  # growth of the depth in a step allowed beyond the motion of the n
 ABOVE = 0.04  # a node that arrives beside a face passes by if another face is nearer than this below it
 
 _RIM = 1e-4  # fraction of half an edge by which a node may lie off a face and still count as above it
+_BESIDE = 1e12  # a face in front that the node is beside counts as so many times farther
 _OPPOSED = -0.9  # least cosine between a node's last contact force and the normal of the face that presses it next
 
 
@@ -44,6 +45,7 @@ class Nearest:
         area: a quarter of the area of the face [m^2].
         front: distance to the nearest face that has the node in front of it, or FAR [m].
         front_face: the nearest one that the node is not beside, else the nearest; -1 if there is none.
+        front_rank: distance to that face, many times as far where the node is beside it; the least goes first [m].
     """
 
     face: wp.int32
@@ -54,6 +56,7 @@ class Nearest:
     area: wp.float64
     front: wp.float64
     front_face: wp.int32
+    front_rank: wp.float64
 
 
 @wp.func
@@ -105,14 +108,54 @@ def passes_by(beside: bool, held: wp.float64, front: wp.float64, edge: wp.float6
 
 
 @wp.func
+def is_outside(
+    X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), face: wp.array2d(dtype=wp.int32), near: Nearest
+) -> bool:
+    """Whether a node behind the nearest face, but off it, is in front of a face that meets it in a convex edge.
+
+    Such a node left the solid as it slid over that edge.
+    """
+    f, g = near.face, near.front_face
+    outside = bool(False)
+    if g >= 0 and is_beside(near.at, face[f, 2] == face[f, 3], wp.float64(0.0)):
+        outside = is_edge(X, u, face, f, g, area_vector(X, u, face, g))
+    return outside
+
+
+@wp.func
+def comes_first(
+    X: wp.array(dtype=wp.vec3d),
+    u: wp.array(dtype=wp.vec3d),
+    face: wp.array2d(dtype=wp.int32),
+    f: int,
+    gap: wp.float64,
+    beside: wp.bool,
+    g: int,
+    other_gap: wp.float64,
+    other_beside: wp.bool,
+) -> bool:
+    """Whether penetrated face f comes before g: the rule of `nearest_face`. Of two faces just one comes first."""
+    first = (gap > other_gap) != beside
+    if beside != other_beside:
+        first = other_beside
+    elif gap == other_gap:
+        first = f < g  # so that the order of the search does not matter
+    elif beside:
+        low, high = wp.min(f, g), wp.max(f, g)
+        if is_edge(X, u, face, low, high, area_vector(X, u, face, high)):
+            first = gap > other_gap
+    return first
+
+
+@wp.func
 def nearest_face(
     X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), master: Master, s: int, x: wp.vec3d, along: wp.vec3f
 ) -> Nearest:
     """Among the candidates of spring s, the face that may press a node at x, whose last contact force was `along`.
 
     Choose the shallowest penetrated face that has the node right below it. If there is none, as in a concave fold,
-    choose the deepest face that the node lies beside. Ties go to the lower number. Skip faces whose normal opposes the
-    last contact force: they are the far side of a thin body.
+    choose the deepest face that the node lies beside; of two that meet in a convex edge, the shallower. Ties go to the
+    lower number. Skip faces whose normal opposes the last contact force: they are the far side of a thin body.
     """
     return nearest_of(X, u, master, s, x, along, 0, 1)
 
@@ -134,8 +177,7 @@ def nearest_of(
     best.face = -1
     best.front = wp.float64(FAR)
     best.front_face = -1
-    front_gap = wp.float64(FAR)  # of front_face
-    front_beside = bool(False)
+    best.front_rank = wp.float64(FAR)
     for c in range(first, master.count[s], stride):
         inside, at, away, area_normal, triangle = project_on_face(X, u, master.face, f, x)
         if inside:
@@ -146,12 +188,10 @@ def nearest_of(
             kept = cosine >= 0.0 or cosine * cosine < wp.static(_OPPOSED**2) * wp.dot(along, along)
             if gap < wp.float64(0.0) and gap * gap < wp.float64(4.0) * area and kept:
                 beside = is_beside(at, triangle, wp.float64(_RIM))
-                better = (gap > best.gap) != beside
-                if beside != best.beside:
-                    better = best.beside
-                elif gap == best.gap:
-                    better = f < best.face  # so that the order of the search does not matter
-                if better or best.face < 0:
+                better = best.face < 0
+                if not better:
+                    better = comes_first(X, u, master.face, f, gap, beside, best.face, best.gap, best.beside)
+                if better:
                     best.face = f
                     best.gap = gap
                     best.normal = normal
@@ -160,10 +200,12 @@ def nearest_of(
                     best.area = area
             elif gap >= wp.float64(0.0):
                 beside = is_beside(at, triangle, wp.float64(_RIM))
-                if best.front_face < 0 or (gap < front_gap if beside == front_beside else front_beside):
+                rank = gap
+                if beside:
+                    rank = wp.float64(_BESIDE) * gap
+                if rank < best.front_rank or (rank == best.front_rank and f < best.front_face):
                     best.front_face = f
-                    front_gap = gap
-                    front_beside = beside
+                    best.front_rank = rank
                 best.front = wp.min(best.front, gap)
         f = master.candidate[s, wp.min(c + stride, master.candidate.shape[1] - 1)]
     return best

@@ -1,4 +1,4 @@
-"""Owns the closest point of a bilinear face."""
+"""Owns the geometry of bilinear faces: the closest point, the area, and how two of them meet."""
 
 import warp as wp
 
@@ -133,3 +133,50 @@ def project_on_face(
     p3 = X[i3] + u[i3] - x
     inside, at, away, area_normal = project(p0, p1, p2, p3, i2 == i3)
     return inside, at, away, area_normal, i2 == i3
+
+
+@wp.func
+def middle(X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), face: wp.array2d(dtype=wp.int32), f: int):
+    """Mean of the corners of face f [m]."""
+    total = wp.vec3d()
+    for c in range(4):
+        total += X[face[f, c]] + u[face[f, c]]
+    return wp.float64(0.25) * total
+
+
+@wp.func
+def area_vector(X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), face: wp.array2d(dtype=wp.int32), f: int):
+    """Vector along the normal of face f at its middle, whose length is twice the area of the face [m^2]."""
+    across = X[face[f, 2]] + u[face[f, 2]] - X[face[f, 0]] - u[face[f, 0]]
+    return wp.cross(across, X[face[f, 3]] + u[face[f, 3]] - X[face[f, 1]] - u[face[f, 1]])
+
+
+@wp.func
+def lies_below(
+    X: wp.array(dtype=wp.vec3d),
+    u: wp.array(dtype=wp.vec3d),
+    face: wp.array2d(dtype=wp.int32),
+    f: int,
+    g: int,
+    normal: wp.vec3d,
+) -> bool:
+    """Whether the middle of face f is behind face g, whose normal is `normal`: no fold where a node is near both."""
+    return wp.dot(middle(X, u, face, f) - middle(X, u, face, g), normal) < wp.float64(0.0)
+
+
+@wp.func
+def is_edge(
+    X: wp.array(dtype=wp.vec3d),
+    u: wp.array(dtype=wp.vec3d),
+    face: wp.array2d(dtype=wp.int32),
+    f: int,
+    g: int,
+    normal: wp.vec3d,
+) -> bool:
+    """Whether faces f and g share a node and meet at the edge of a solid, not in a fold; `normal` is that of g."""
+    shared = bool(False)
+    for a in range(4):
+        for b in range(4):
+            if face[f, a] == face[g, b]:
+                shared = bool(True)
+    return shared and lies_below(X, u, face, f, g, normal)

@@ -6,7 +6,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.laws import Laws
-from warp_mca.kernels.contact.nearest import Master, Nearest, edge_of, master_velocity, passes_by, reachable
+from warp_mca.kernels.contact.nearest import Master, Nearest, edge_of, is_outside, master_velocity, passes_by, reachable
 from warp_mca.kernels.contact.projection import weights_at
 from warp_mca.kernels.contact.search import TOO_DEEP, TURNED
 from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring, open_function, rest_function, spring_function
@@ -65,6 +65,8 @@ def meet(
 
 @wp.func
 def meet_side(
+    X: wp.array(dtype=wp.vec3d),
+    u: wp.array(dtype=wp.vec3d),
     v: wp.array(dtype=wp.vec3d),
     master: Master,
     i: int,
@@ -80,17 +82,21 @@ def meet_side(
     touch.touches = reachable(-near.gap, held, near.front, wp.dot(touch.du, near.normal), edge)
     if passes_by(near.beside, held, near.front, edge):
         touch.touches = bool(False)
+    if touch.touches and is_outside(X, u, master.face, near):
+        touch.touches = bool(False)
     touch.own = own
     touch.limit = master.stiffness[near.face]
+    if held < wp.float64(ANY_DEPTH):
+        touch.begins = wp.max(-wp.dot(touch.du, near.normal), wp.float64(0.0))
     return touch
 
 
 @cache
-def settle_functions(friction: bool, stress_free: bool, laws: Laws) -> tuple[Any, Any]:
+def settle_functions(friction: bool, laws: Laws) -> tuple[Any, Any]:
     """The functions (settle: press a node on the face that it touches; let_go: release a node that found no face)."""
     press = spring_function(friction, laws)
     open_contact = open_function(friction, laws)
-    gap_from_rest = rest_function(stress_free)
+    gap_from_rest = rest_function(True)
 
     @wp.func
     def settle(
@@ -108,9 +114,8 @@ def settle_functions(friction: bool, stress_free: bool, laws: Laws) -> tuple[Any
         # a spring with neither gap nor normal has no force, and is released as an open one
         gap_kept = wp.where(touch.touches, near.gap, wp.float64(0.0))
         normal_kept = wp.where(touch.touches, near.normal, wp.vec3d())
-        if wp.static(stress_free):
-            if touch.touches and spring.face[s] < 0 and touch.begins < wp.float64(FAR):
-                spring.rest[s] = wp.max(-near.gap - touch.begins, wp.float64(0.0))
+        if touch.touches and spring.face[s] < 0 and touch.begins < wp.float64(FAR):
+            spring.rest[s] = wp.max(-near.gap - touch.begins, wp.float64(0.0))
         gap_pressed = gap_from_rest(s, gap_kept, spring)
         k_old = wp.where(spring.face[s] < 0, wp.min(touch.own, touch.limit), spring.stiffness[s])
         stiffness = wp.where(touch.touches, wp.min(k_old, touch.limit), k_old)

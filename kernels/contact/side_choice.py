@@ -5,8 +5,9 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.contact.edges import Surfaces, area_vector, is_edge, opposition
+from warp_mca.kernels.contact.edges import Surfaces, opposition
 from warp_mca.kernels.contact.nearest import Nearest, edge_of
+from warp_mca.kernels.contact.projection import area_vector, is_edge
 from warp_mca.kernels.contact.settle import Touch
 from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring, pressure_function
 from warp_mca.kernels.contact.way_back import OPPOSES, WayBack, way_back_function

@@ -5,9 +5,10 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.contact.edges import Surfaces, area_vector, lies_below, opposition
-from warp_mca.kernels.contact.nearest import Nearest, edge_of, nearest_face, passes_by, reachable
+from warp_mca.kernels.contact.edges import Surfaces, opposition
+from warp_mca.kernels.contact.nearest import Nearest, edge_of, is_outside, nearest_face, passes_by, reachable
 from warp_mca.kernels.contact.pairs import same_solid
+from warp_mca.kernels.contact.projection import area_vector, lies_below
 from warp_mca.kernels.contact.side_choice import NodeSprings
 from warp_mca.kernels.contact.spring import FAR
 from warp_mca.kernels.contact.way_back import OPPOSES, slides_at, usual_depth
@@ -97,6 +98,8 @@ def front_functions(sides: int) -> tuple[Any, Any]:
         edge = edge_of(near)
         fold = wp.where(pressed, near.front, wp.float64(0.0))
         found = in_reach(near, node, held, fold, -wp.dot(du, near.normal))
+        if found and is_outside(at.X, at.u, at.master.face, near):
+            found = bool(False)
         for p in range(wp.static(sides)):
             if passes_by(bool(True), wp.max(held, node.released), front_gap[p], edge):
                 if belongs_to_other_side(at, s, near, front_face[p], front_gap[p], recent_force):

@@ -37,7 +37,7 @@ def sided_kernel(friction: bool, each: bool, sides: int, laws: Laws = PLAIN, slo
     the side that released it, because it may have slid over an edge. If several sides have candidates, step 0 chooses
     among them; step 1 presses the node. Each of the `slots` bodies that a node may touch at once has its own springs.
     """
-    settle, _ = settle_functions(friction, True, laws)
+    settle, _ = settle_functions(friction, laws)
     choose, confirm = choice_functions(sides)
     pressure, springs_of_node = pressure_function(friction), springs_function(friction, sides)
     front_faces, may_press = front_functions(sides)

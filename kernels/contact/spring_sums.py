@@ -53,10 +53,7 @@ def sum_springs(
             square = wp.dot(Fn, Fn)
             pressed += Fn
             sums[wp.static(PRESSURE)] += wp.sqrt(square)
-            if spring.normal_energy.shape[0] > 0:
-                pressed_energy += spring.normal_energy[s]
-            else:
-                pressed_energy += held * (square / (square + wp.dot(Ft, Ft)))
+            pressed_energy += spring.normal_energy[s]
             sums[wp.static(SQUARES)] += square
         sums[wp.static(FRICTION)] += spring.friction[s]
         sums[wp.static(PLANE_WORK)] += spring.drive[s]

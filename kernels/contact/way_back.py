@@ -5,9 +5,10 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.contact.edges import Surfaces, greatest_stiffness, is_on_rim, lies_below, opposition
+from warp_mca.kernels.contact.edges import Surfaces, greatest_stiffness, is_on_rim, opposition
 from warp_mca.kernels.contact.nearest import ABOVE, SLACK, Nearest, edge_of, nearest_face
 from warp_mca.kernels.contact.pairs import same_solid
+from warp_mca.kernels.contact.projection import lies_below
 from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring
 
 OPPOSES = 0.5  # difference of cosines by which the faces of a slave clearly oppose one side more than another

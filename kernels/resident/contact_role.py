@@ -10,7 +10,7 @@ import warp as wp
 
 from warp_mca.kernels.contact.contact import LANES
 from warp_mca.kernels.contact.laws import Laws
-from warp_mca.kernels.contact.nearest import Master, Nearest, nearest_of
+from warp_mca.kernels.contact.nearest import Master, Nearest, comes_first, nearest_of
 from warp_mca.kernels.contact.search import STALE, moved_too_far
 from warp_mca.kernels.contact.settle import meet_side, settle_functions
 from warp_mca.kernels.contact.spring import Spring, pressure_function
@@ -44,18 +44,6 @@ class Slaves:
 
 
 @wp.func
-def comes_first(
-    gap: wp.float64, beside: wp.bool, f: int, other_gap: wp.float64, other_beside: wp.bool, other: int
-) -> bool:
-    """Whether face f comes before another penetrated face by the rule of `nearest_face`."""
-    if beside != other_beside:
-        return other_beside
-    if gap == other_gap:
-        return f < other
-    return (gap > other_gap) != beside
-
-
-@wp.func
 def nearest_of_lanes(
     X: wp.array(dtype=wp.vec3d),
     u: wp.array(dtype=wp.vec3d),
@@ -75,7 +63,13 @@ def nearest_of_lanes(
         other_beside = exchange(wp.where(beside, wp.float64(1.0), wp.float64(0.0)), 1 << k) > wp.float64(0.0)
         other = int(exchange(wp.float64(face), 1 << k))
         near.front = wp.min(near.front, exchange(near.front, 1 << k))
-        if other >= 0 and (face < 0 or comes_first(other_gap, other_beside, other, gap, beside, face)):
+        rank = exchange(near.front_rank, 1 << k)
+        front_face = int(exchange(wp.float64(near.front_face), 1 << k))
+        if rank < near.front_rank or (rank == near.front_rank and front_face < near.front_face):
+            near.front_rank = rank
+            near.front_face = front_face
+        first = comes_first(X, u, master.face, other, other_gap, other_beside, face, gap, beside)
+        if other >= 0 and (face < 0 or first):
             gap = other_gap
             beside = other_beside
             face = other
@@ -86,15 +80,16 @@ def nearest_of_lanes(
 
 
 @cache
-def contact_role(friction: bool, stress_free: bool, laws: Laws) -> Any:
+def contact_role(friction: bool, laws: Laws) -> Any:
     """The function that gives slave nodes their contact forces in each of the kernel's steps."""
-    settle, let_go = settle_functions(friction, stress_free, laws)
+    settle, let_go = settle_functions(friction, laws)
     pressure = pressure_function(friction)
 
     @wp.func
     def touch_nearest(
         s: int,
         i: int,
+        X: wp.array(dtype=wp.vec3d),
         near: Nearest,
         along: wp.vec3f,
         held: wp.float64,
@@ -108,7 +103,7 @@ def contact_role(friction: bool, stress_free: bool, laws: Laws) -> Any:
     ):
         """Press a node or release it, as `contact.surface_kernel` does."""
         if near.face >= 0:
-            touch = meet_side(state_out.v, master, i, near, slaves.stiffness[s], dt, held, along)
+            touch = meet_side(X, state_out.u, state_out.v, master, i, near, slaves.stiffness[s], dt, held, along)
             state_out.nodal_force[i] = state_out.nodal_force[i] + settle(
                 s, 0, near, touch, slaves.mu, slaves.per_newton, spring, normal_force_out, flag_out
             )
@@ -149,7 +144,7 @@ def contact_role(friction: bool, stress_free: bool, laws: Laws) -> Any:
                 near, holds = nearest_of_lanes(X, state_out.u, master, s, x + state_out.u[i], along, q)
                 if exists and holds:
                     touch_nearest(
-                        s, i, near, along, held, slaves, master, dt, spring, state_out, normal_force_out, flag_out
+                        s, i, X, near, along, held, slaves, master, dt, spring, state_out, normal_force_out, flag_out
                     )  # fmt: skip
                 if q == 0 and moved_too_far(state_out.u[i], searched, slaves.margin):
                     flag_out[0, wp.static(STALE)] = 1

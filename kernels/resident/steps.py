@@ -58,7 +58,6 @@ def resident_kernel(
     turned: bool,
     contact: bool,
     friction: bool,
-    stress_free: bool,
     contact_laws: Laws,
     partial: bool,
     coupled: bool,
@@ -72,11 +71,9 @@ def resident_kernel(
     """
     t = scalars(precision)
     R, vec3, point = t.real, t.vec3, POINT[precision]
-    compute_patch, move_free = (
-        patch_role(maker, precision, law_name, viscous, turned),
-        free_role(precision, contact, turned),
-    )
-    touch_slaves, move_masters = contact_role(friction, stress_free, contact_laws), master_role(precision, turned)
+    compute_patch = patch_role(maker, precision, law_name, viscous, turned)
+    move_free = free_role(precision, contact, turned)
+    touch_slaves, move_masters = contact_role(friction, contact_laws), master_role(precision, turned)
     move_bound, move_pinned = bound_role(precision, partial, turned), pin_role(precision, turned)
 
     @wp.func

@@ -50,13 +50,12 @@ def _contacts(
             found, value = general_passes(parts, contact, index)
             added += value
             decay = found[0].damping * float(value.max()) / found[0].stiffening if found[0].damping else 0.0
-            passes += [replace(item, penalty_given=contact.penalty is not None, decay=decay) for item in found]
+            passes += [replace(item, decay=decay) for item in found]
             penalties.append(None)
             continue
         slave = parts.faces(contact.slave)
         master = None if isinstance(contact.master, RigidPlane) else parts.faces(contact.master)
         contact = replace(contact, two_way=is_two_way(contact, slave, master))
-        given = contact.penalty not in (None, "auto")
         contact, chosen = settled(parts, contact, slave, master, velocity)
         penalties.append(chosen)
         for item in contact_passes(contact, index, slave, master):
@@ -65,7 +64,7 @@ def _contacts(
             nodes, value = contact_eigenvalues(item, sides[0], sides[1], parts.mass)
             np.add.at(added, nodes, bounce_factor(contact, parts.scene) * value)
             decay = item.damping * float(value.max()) / item.stiffening if item.damping else 0.0
-            passes.append(replace(item, penalty_given=given, decay=decay))
+            passes.append(replace(item, decay=decay))
         if master is not None and (edges := edge_pass(parts.X, passes[-1 - contact.two_way], slave, master, contact)):
             nodes, value = edge_eigenvalues(edges, parts.mass)
             added[nodes] += bounce_factor(contact, parts.scene) * value

@@ -38,9 +38,6 @@ class SceneRecords:
         initial_energy: stored at the start [J].
         initial_kinetic: kinetic energy at the start [J].
         initial_work: that driven nodes do in the half step before the start [J].
-        initial_made: that contact springs made as they closed at the start [J].
-        made: greatest energy that contact springs made or took as they closed or opened within a step, as a share of
-            initial energy and external work [-].
         energy_scale: greatest initial energy and external work so far [J]: at rest the work of gravity returns to none.
         exchanged: greatest energy that was in elements, contact springs and friction, or that motion had gained or
             lost [J].
@@ -69,8 +66,6 @@ class SceneRecords:
     initial_energy: float = np.nan
     initial_kinetic: float = 0.0
     initial_work: float = 0.0
-    initial_made: float = 0.0
-    made: float = 0.0
     energy_scale: float = 0.0
     exchanged: float = 0.0
     imbalance: float = 0.0

@@ -110,7 +110,7 @@ class Resident:
         assert isinstance(patches, PatchStage)
         contact, block = surface_of(solver), patches.block
         item = contact.items[0] if contact else None
-        friction, stress_free = (item.mu > 0.0, contact.stress_free) if item and contact else (False, False)
+        friction = item is not None and item.mu > 0.0
         self.kernel = resident_kernel(
             patches.maker,
             solver.precision,
@@ -119,7 +119,6 @@ class Resident:
             solver.nodes.kind.turned,
             contact is not None,
             friction,
-            stress_free,
             contact.laws if contact else PLAIN,
             solver.constraints.partial and not solver.couplings.count,
             solver.couplings.count > 0,

@@ -39,19 +39,6 @@ def imbalance_of_exchange(c: Finished, _: float) -> Iterator[Values]:
 
 
 @row(
-    "contact springs made or took up to {made:.2%} of all energy as they closed and opened within steps, more than "
-    "energy_tolerance = {tolerance:g}, and the bodies have as much more or less:",
-    "{remedy}",
-    unit="energy_tolerance at most",
-)
-def energy_of_switching(c: Finished, _: float) -> Iterator[Values]:
-    """Energy that contact springs made or took, as a share of initial energy and external work."""
-    made, tolerance = c.ledger.kept.made, c.scene.impact.energy_tolerance
-    if made > tolerance:
-        yield dict(made=made, tolerance=tolerance, remedy=c.ledger.remedy)
-
-
-@row(
     "nodes that a master pressed went over to a face of it around a sharp edge, where single nodes do not tell which "
     "side is meant:",
     "make a contact of each of its sides, or finer meshes, and compare",

@@ -25,15 +25,14 @@ class Reading:
         flags: whether kernels saw a full list of faces, a node that outran the search, one that is too deep.
         time: that the next record would have [s].
         sums: columns of the latest record, shape (column_count,), float64, if it is not sound or its balance is off.
-        balance: of the latter, imbalance, the part of it that contact springs did not make [-], and initial energy and
-            external work [J].
+        balance: of the latter, imbalance [-], and initial energy and external work [J].
     """
 
     ledger: Ledger
     flags: Sequence[bool]
     time: float
     sums: Array | None = None
-    balance: tuple[float, float, float] | None = None
+    balance: tuple[float, float] | None = None
 
 
 flag = partial(row, kind=Kind.GUARD, when=When.FLAGS)
@@ -77,15 +76,15 @@ def sunken_node(c: Reading, _: float) -> Iterator[Values]:
     "energy imbalance {percent:.3g}% at t = {time:.4g} s exceeds energy_tolerance = {tolerance:g} of {scale:.3g} J, "
     "initial energy and external work so far{cause}:",
     "{remedy}, or raise the tolerance if that much is acceptable",
-    unit="energy_tolerance at most; ten times that where contact springs made it, whose penalty is not given",
+    unit="energy_tolerance at most, twice that where contact springs made it",
 )
 def energy_imbalance(c: Reading, _: float) -> Iterator[Values]:
     """Initial energy and external work, less all that is accounted for, over their sum."""
     if c.sums is not None and c.balance:
-        ledger, (share, unexplained, scale) = c.ledger, c.balance
+        ledger, (share, scale) = c.ledger, c.balance
         yield dict(
             percent=100.0 * share, time=ledger.time(-1), tolerance=ledger.tolerance, scale=scale,
-            cause=ledger.cause(c.sums, unexplained), remedy=ledger.remedy,
+            cause=ledger.cause(c.sums), remedy=ledger.remedy,
         )  # fmt: skip
 
 

@@ -44,12 +44,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Energy that contact springs may make or take as they close and open within a step, in tolerances. With a tolerance
-# below the usual one, or a penalty that the scene gives and can lower, they have no such allowance.
-MOST_MADE, USUAL = 10.0, 0.01
 MIN_EXCHANGE = 1e-7  # share of all energy below which exchanged energy is not counted
 MIN_FREE_EXCHANGE = 1e-4  # the same without contact: what turns on joints in `mixed` gains 5e-6 by rounding in 6 ms
-SLIDING = 0.1  # share of the external work that friction takes, from which on a stop says that nodes slide
+MOST = 2.0  # tolerances by which contact springs may be off, see `kernels.contact.balance`
+MOSTLY = 0.5  # share of the imbalance that one contact explains, from which on a stop names it
 TURNED = 0.01  # angle from which on the rounding of float32 heats what turns [rad]
 
 
@@ -58,7 +56,6 @@ class Ledger:
 
     Attributes:
         kept: what it has taken in so far, a part of the run's state.
-        most_made: share of all energy that contact springs may make or take as they close and open within steps [-].
     """
 
     def __init__(
@@ -73,8 +70,6 @@ class Ledger:
         if not len(kept.peaks):
             kept.peaks = np.zeros((len(model.passes), 2))
         self.spin = _spin(model)
-        given = any(item.penalty_given for item in model.passes)
-        self.most_made = 0.0 if given or tolerance < USUAL else MOST_MADE * tolerance
         self.rounding = _rounding(model, steps.dt / (model.rates.substeps if model.rates else 1))
 
     @property
@@ -104,8 +99,8 @@ class Ledger:
         stop(When.FLAGS, Reading(ledger=self, flags=flags, time=self.time(written)))  # explain what sums would show
         sound = np.isfinite(sums).all(axis=1) & (sums[:, JACOBIAN] > 0.0)
         good = written if sound.all() else int(np.argmin(sound))
-        share, unexplained, made, scale = self._balance(sums[:good])
-        over = (share > self.tolerance) & ((unexplained > self.tolerance) | (made > self.most_made))
+        share, counted, scale = self._balance(sums[:good])
+        over = counted > self.tolerance
         end = int(np.argmax(over)) + 1 if over.any() else good
         self._note_peaks(sums[:end])
         rows = self.rows(end)
@@ -116,8 +111,7 @@ class Ledger:
         self.kept.max_strain = max(self.kept.max_strain, float(sums[:end, STRAIN].max(initial=0.0)))
         self.kept.min_jacobian = min(self.kept.min_jacobian, float(sums[:end, JACOBIAN].min(initial=1.0)))
         self.kept.energy_error = max(self.kept.energy_error, float(share[:end].max(initial=0.0)))
-        self.kept.made = max(self.kept.made, float(made[:end].max(initial=0.0)))
-        balance = (float(share[end - 1]), float(unexplained[end - 1]), float(scale[end - 1])) if over.any() else None
+        balance = (float(share[end - 1]), float(scale[end - 1])) if over.any() else None
         latest = sums[end - 1] if balance else sums[good] if good < written else None
         stop(When.RECORDS, Reading(ledger=self, flags=(), time=self.time(), sums=latest, balance=balance))
 
@@ -165,23 +159,33 @@ class Ledger:
         return found | {"external_work": found["external_work"] - self.kept.initial_work}
 
     def _made(self, sums: Array) -> Array:
-        """Energy that contact springs made as they closed and opened within steps [J], of each row of sums."""
-        return self.springs(sums)[..., MADE].sum(axis=-1) - self.kept.initial_made
+        """Energy that springs of each pass made since the first row [J], shape (..., pass_count)."""
+        made = self.springs(sums)[..., MADE]
+        return made - (self.springs(self.kept.sums[0])[:, MADE] if self.kept.sums else made[:1])
 
-    def cause(self, sums: Array, unexplained: float) -> str:
-        """What a record's imbalance comes from, where contact explains it."""
-        if unexplained > self.tolerance:
-            return ""
-        found = f", of which contact springs made {self._made(sums):.3g} J as they closed and opened within steps"
+    def cause(self, sums: Array) -> str:
+        """The contact whose springs made most of a record's imbalance, if one did."""
         energy = self._energies(sums)
-        if energy["friction"] > SLIDING * abs(energy["external_work"]) > 0.0:
-            found += f", whose nodes slide a little each time, {energy['friction']:.3g} J in all"
-        return found
+        work = energy.pop("external_work")
+        net = float(sum(energy.values(), np.zeros(())) - work - self.initial_energy)
+        made = self._made(sums)
+        for k in {item.contact for item in self.model.passes}:
+            own = [item.contact == k for item in self.model.passes]
+            share = float(made[own].sum())
+            if share * net > MOSTLY * net * net:
+                item = self.model.passes[own.index(True)]
+                master = "a plane" if item.plane is not None else self._body(int(item.master[0]))
+                return f", of which contact springs of {self._body(int(item.slave[0]))} on {master} made {share:.3g} J"
+        return ""
 
-    def _balance(self, sums: Array) -> tuple[Array, Array, Array, Array]:
-        """Imbalance of each row of sums; that without what contact springs made; and this, see `switch`.
+    def _body(self, node: int) -> str:
+        """The body that has a node."""
+        return max((first, name) for name, first in self.model.node_start.items() if first <= node)[1]
 
-        All as shares of initial energy and external work [-], which come last [J].
+    def _balance(self, sums: Array) -> tuple[Array, Array, Array]:
+        """Imbalance of each row of sums; what counts of it; both over initial energy and external work [-]; these [J].
+
+        Of what contact springs made, which they take back as far as they can, 1 / MOST counts.
         """
         energy = self._energies(sums)
         work = energy.pop("external_work")
@@ -189,7 +193,6 @@ class Ledger:
         if np.isnan(self.kept.initial_energy) and len(sums):
             self.kept.initial_energy, self.kept.initial_work = float(stored[0]), float(work[0])
             self.kept.initial_kinetic = float(energy["kinetic"][0])
-            self.kept.initial_made = float(self._made(sums)[0])
             work = work - self.kept.initial_work
         initial = self.initial_energy
         scale = np.maximum.accumulate(np.maximum(abs(initial) + np.abs(work), self.kept.energy_scale))
@@ -198,14 +201,14 @@ class Ledger:
             (self.springs(sums)[..., NORMAL_IMPULSE] > 0.0).any() or (energy["contact"] > 0.0).any()
         )
         self.kept.worked = float(np.abs(work).max(initial=self.kept.worked))
-        made, net = self._made(sums), stored - work - initial
+        made, net = self._made(sums).sum(axis=-1), stored - work - initial
         imbalance, moved = np.abs(net), np.abs(energy["kinetic"] - self.kept.initial_kinetic)
         self.kept.imbalance = float(imbalance.max(initial=self.kept.imbalance))
         self.kept.exchanged = float(np.maximum(moved, stored - energy["kinetic"]).max(initial=self.kept.exchanged))
         scale = np.maximum(scale, self.rounding)
-        shares = np.zeros((3, len(sums)))
-        np.divide([imbalance, np.abs(net - made), np.abs(made)], scale, out=shares, where=scale > 0.0)
-        return shares[0], shares[1], shares[2], scale
+        shares = np.zeros((2, len(sums)))
+        np.divide([imbalance, np.maximum(np.abs(net - made), imbalance / MOST)], scale, out=shares, where=scale > 0.0)
+        return shares[0], shares[1], scale
 
     @property
     def initial_energy(self) -> float:

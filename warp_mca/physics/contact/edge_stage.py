@@ -86,7 +86,7 @@ class EdgeStage(ContactStage):
         found, count = edge_springs.Met(), int(self.springs[-1])
         kinds = {"edge": wp.int32, "before": wp.int32, "weight": wp.vec4d}
         kinds |= dict.fromkeys(("normal", "du", "force", "tangential"), wp.vec3d)
-        kinds |= dict.fromkeys(("gap", "rest", "stiffness", "energy"), wp.float64)
+        kinds |= dict.fromkeys(("gap", "rest", "stiffness", "energy", "owed"), wp.float64)
         for name, kind in kinds.items():
             setattr(found, name, wp.zeros(count, dtype=kind))
         found.taken = wp.full(count, edge_springs.NOBODY, dtype=wp.int32)
@@ -96,7 +96,6 @@ class EdgeStage(ContactStage):
         """Springs that nothing presses, and empty lists, on the current device."""
         springs = new_springs(int(self.springs[-1]), 0, self)
         springs.held.zero_()
-        springs.rest = wp.zeros(int(self.springs[-1]), dtype=wp.float64)
         return ContactState(
             spring=springs,
             count=wp.zeros(len(self.slave), dtype=wp.int32),

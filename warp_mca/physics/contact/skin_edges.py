@@ -118,7 +118,7 @@ def _shared(first: ContactPass) -> dict[str, Any]:
     names = (
         "mu contact law parameters stiffening friction damping face side slave_face margin longest initial_overlap sign"
     )
-    return {name: getattr(first, name) for name in (*names.split(), "penalty_given", "face_stiffness")}
+    return {name: getattr(first, name) for name in (*names.split(), "face_stiffness")}
 
 
 def no_edges(first: ContactPass) -> EdgePass:

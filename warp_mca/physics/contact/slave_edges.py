@@ -9,7 +9,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.kernels.contact import contact, edge_shares, edges, spring
-from warp_mca.kernels.contact.laws import LINEAR, law_functions
+from warp_mca.kernels.contact.laws import law_functions
 from warp_mca.step.threads import CONTACT, Split
 
 if TYPE_CHECKING:
@@ -25,16 +25,15 @@ def new_springs(count: int, sided: int, stage: ContactStage) -> Any:
     Where some begin free of stress, their resting depth is 0.
     """
     found = spring.Spring()
-    numbers = "energy friction drive normal_impulse stick_impulse depth lost made stiffness"
+    numbers = "energy friction drive normal_impulse stick_impulse depth lost made owed stiffness normal_energy"
     for name in ("tangential", "force", "impulse"):
         setattr(found, name, wp.zeros(count, dtype=wp.vec3d))
     for name in numbers.split():
         setattr(found, name, wp.zeros(count, dtype=wp.float64))
-    found.normal_energy = wp.zeros(0 if stage.laws.normal == LINEAR else count, dtype=wp.float64)
     found.dashpot = wp.zeros(0 if law_functions(stage.laws.normal).dashpot is None else count, dtype=wp.vec2d)
     found.parameters, found.friction_parameters = stage.parameters, stage.friction_parameters
     found.limit = wp.zeros(count if stage.laws.friction else 0, dtype=wp.float64)
-    found.rest = wp.zeros(count if stage.stress_free else sided, dtype=wp.float64)
+    found.rest = wp.zeros(count if stage.stress_free or not stage.on_plane else sided, dtype=wp.float64)
     found.left = wp.zeros(sided, dtype=wp.float64)
     found.share = wp.full(sided, 1.0, dtype=wp.float64)
     found.support = wp.full(sided, -1, dtype=wp.int32)

@@ -57,7 +57,7 @@ class ContactStage:
             return
         slots = SLOTS if self.general and self.sides > 1 else 1
         self.kernel = (
-            contact.surface_kernel(friction, self.each, self.stress_free, self.laws, self.noted, self.general)
+            contact.surface_kernel(friction, self.each, self.laws, self.noted, self.general)
             if self.sides == 1
             else sides.sided_kernel(friction, self.each, self.sides // slots, self.laws, slots)
         )

@@ -89,7 +89,6 @@ class ContactPass:
         deepest: penetration of a plane that stops the run [m]; faces have half their own size.
         initial_overlap: as in `Contact`.
         pairs: bodies of a general contact, or None.
-        penalty_given: whether the scene gives a number for the penalty.
     """
 
     slave: Index = field(metadata=of("nodes"))
@@ -121,7 +120,6 @@ class ContactPass:
     deepest: float = field(default=0.0, metadata=AS_IS)
     initial_overlap: str = field(default="refuse", metadata=AS_IS)
     pairs: Pairs | None = field(default=None, metadata=AS_IS)
-    penalty_given: bool = field(default=False, metadata=AS_IS)
 
     @property
     def leads(self) -> bool:
