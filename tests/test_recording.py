@@ -150,7 +150,7 @@ def test_the_wave_behind_the_front_carries_the_stress_of_bar_theory():
     result = mca.run(bar(wall=0.1, divisions=(40, 4, 4)), duration=1.6e-5)
     axis = result.paths[0]
     c = STEEL.wave_speeds["bar"]
-    behind = axis.position < 0.5 * c * result.time[-1]
+    behind = axis.position < 0.6 * c * result.time[-1]  # as much as 0.3 and 0.4 differ, +-0.9 %, is ringing
     along = axis.stress[-1, behind, 0].mean()
     assert along == pytest.approx(-STEEL.rho * c * 2.0, rel=5e-3)
     assert np.abs(axis.stress[-1, axis.position > 1.2 * c * result.time[-1]]).max() < 0.01 * abs(along)
