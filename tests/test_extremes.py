@@ -67,7 +67,7 @@ def heads_on(two_way: bool) -> mca.Scene:
     left = mca.Body(name="left", velocity=(2.0, 0.0, 0.0), **steel)
     right = mca.Body(name="right", position=(0.02, 0.0, 0.0), **steel)
     ends = mca.Surface(body="left", nodes="xmax"), mca.Surface(body="right", nodes="xmin")
-    contact = mca.Contact(slave=ends[0], master=ends[1], two_way=two_way)
+    contact = mca.Contact(slave=ends[0], master=ends[1], two_way=two_way, penalty=1.0)
     return mca.Scene(name="heads on", bodies=(left, right), contacts=(contact,), impact=mca.ImpactPhase(duration=1e-5))
 
 

@@ -44,7 +44,7 @@ def test_eight_folds_are_pressed_on_each_other(around) -> None:
     mesh = folded(arms=9, arm=0.003, bend=0.9e-3, cell=0.6e-3, around=around, radius=0.006)
     scene = press(mesh, (FOLDED,), 2.45e-4, 30.0, ("z", "x") if around else ("z", "z"))
     impact = finished(scene)
-    (item,), spring = impact.solver.model.passes, impact.state.contacts[0].spring
+    item, spring = impact.solver.model.passes[0], impact.state.contacts[0].spring
     touched = np.repeat(item.slave, item.sides)[spring.depth.numpy() > 0.0]
     height = impact.solver.model.X[touched, 1] / 1.8e-3
     assert set(np.floor(height + 0.5)) == set(range(9))  # each of the arms

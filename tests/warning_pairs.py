@@ -351,7 +351,7 @@ def _(beyond: bool) -> list[str]:
 
 @pair(meshes.coarse_slave)
 def _(beyond: bool) -> list[str]:
-    return told_of(meshes.coarse_slave, stacked(8, 5 if beyond else 6))
+    return told_of(meshes.coarse_slave, stacked(8, 5 if beyond else 6, two_way=False))
 
 
 @pair(meshes.coarse_shape)

@@ -31,10 +31,10 @@ BOUND = 0.1  # component of a normal along an axis from which on a node that is 
 )
 def small_patch(c: Finished, patch: float) -> Iterator[Values]:
     """Nodes that carried each contact when its force was greatest."""
-    greatest = c.ledger.kept.peaks[:, 0]
+    by_nodes = {item.contact for k, item in enumerate(c.model.passes) if item.leads and c.ledger.nodes_at_peak(k)}
     for k, item, contact in listed_passes(c.scene, c.model):
-        own = [e for e, other in enumerate(c.model.passes) if other.contact == item.contact and other.sign > 0.0]
-        if item.sign > 0.0 and greatest[k] == greatest[own].max() and (count := _few_nodes(c, k, patch)):
+        alone = item.leads or (item.sign > 0.0 and item.contact not in by_nodes)  # edges
+        if alone and (count := _few_nodes(c, k, patch)):
             at_all = "less than three cells across" if is_curved_contact(c.model.X, item) else "a corner or an edge"
             yield dict(body=contact.slave.body, count=count, at_all=at_all)
 

@@ -33,8 +33,8 @@ APART = (
 )
 PARTS = "no contact keeps them apart; take contacts='all', or a ContactAll beside the contacts that are listed"
 BETWEEN = (
-    "contact keeps only nodes of a slave out of its master, and edges pass between them; let nodes lie closer where "
-    "the bodies meet, and set two_way"
+    "contact springs are pressed so deep, or nodes of a master pass between those of a coarser slave; let nodes lie "
+    "closer where the bodies meet, and do not set two_way=False"
 )
 
 

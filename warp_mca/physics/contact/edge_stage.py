@@ -10,7 +10,7 @@ import warp as wp
 
 from warp_mca.base.arrays import Index
 from warp_mca.base.joining import offsets
-from warp_mca.kernels.contact import contact, edge_pairs, edge_search, edge_springs, search
+from warp_mca.kernels.contact import contact, edge_meet, edge_pairs, edge_search, edge_springs, search
 from warp_mca.physics.contact.contact_state import ContactState
 from warp_mca.physics.contact.per_scene import per_scene
 from warp_mca.physics.contact.skin_edges import EdgePass
@@ -37,7 +37,7 @@ class EdgeStage(ContactStage):
         """As `ContactStage`."""
         self._begin(items, model, index, normal_force)
         friction = any(item.mu > 0.0 for item in items)
-        self.meet = edge_springs.meet_kernel()
+        self.meet = edge_meet.meet_kernel()
         self.kernel = edge_springs.press_kernel(friction, self.each, self.laws)
         self.share = edge_springs.share_kernel()
         self.bounds = edge_search.edge_bounds_kernel(self.each)
@@ -78,18 +78,18 @@ class EdgeStage(ContactStage):
         place = np.searchsorted(self.node, mine)
         met = [np.concatenate([edge[offset[k] : offset[k + 1]] for k in ends]) for ends in place]
         chains = [[a, *sorted(set(near[near >= 0].tolist()) - {a})] for a, near in enumerate(met)]
-        self.chains = edge_springs.Chains()
+        self.chains = edge_meet.Chains()
         self.chains.offset = wp.array(offsets([len(chain) for chain in chains]), dtype=wp.int32)
         self.chains.edge = wp.array(np.concatenate(chains), dtype=wp.int32)
 
     def _new_met(self) -> Any:
-        found, count = edge_springs.Met(), int(self.springs[-1])
+        found, count = edge_meet.Met(), int(self.springs[-1])
         kinds = {"edge": wp.int32, "before": wp.int32, "weight": wp.vec4d}
         kinds |= dict.fromkeys(("normal", "du", "force", "tangential"), wp.vec3d)
         kinds |= dict.fromkeys(("gap", "rest", "stiffness", "energy", "owed"), wp.float64)
         for name, kind in kinds.items():
             setattr(found, name, wp.zeros(count, dtype=kind))
-        found.taken = wp.full(count, edge_springs.NOBODY, dtype=wp.int32)
+        found.taken = wp.full(count, edge_meet.NOBODY, dtype=wp.int32)
         return found
 
     def new_state(self) -> ContactState:
