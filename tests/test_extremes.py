@@ -29,15 +29,12 @@ def run(
 
 
 def fast(element: str = "hex8") -> mca.Scene:
-    """A bar of 40 elements that strikes a wall at a ninth of its wave speed, and has left it after 30 us.
-
-    With springs of a penalty of 10 and this step, cells of `tet10` turn inside out.
-    """
-    scene = bar(penalty=3.0 if element == "tet10" else 10.0, energy_tolerance=1.0)
+    """A bar of 40 elements that strikes a wall at 600 m/s, a ninth of its wave speed, and has left it after 30 us."""
+    scene = bar(penalty=10.0, energy_tolerance=1.0)
     body = replace(
         scene.bodies[0],
         geometry=mca.Box(size=(0.04, 0.01, 0.01), divisions=(40, 2, 2)),
-        velocity=(640.0 if element == "hex8r" else 600.0, 0.0, 0.0),
+        velocity=(600.0, 0.0, 0.0),
         element=element,
     )
     wall = mca.RigidPlane(point=(0.04, 0.0, 0.0), normal=(-1, 0, 0))
@@ -121,7 +118,7 @@ def test_an_imbalance_between_two_rows_stops_the_run(monkeypatch):
     assert coarse["E_total_error"].shape == (2,)
     assert coarse.summary["extremes"]["energy_error"] == coarse.summary["energy_error"] > 1.5 * last
     assert coarse.summary["energy_error"] > 0.6 * fine.summary["energy_error"]
-    strict = replace(scene, impact=replace(scene.impact, energy_tolerance=1.25 * last))
+    strict = replace(scene, impact=replace(scene.impact, energy_tolerance=0.6 * last))
     with pytest.raises(mca.GuardError, match=r"energy imbalance .* at t = ") as found:
         run(strict, monkeypatch, 1, 2400, dt)
     time = float(re.search(r"at t = (\S+) s", str(found.value))[1])

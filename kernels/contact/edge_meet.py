@@ -30,7 +30,7 @@ class Met:
         taken: the spring that takes this one's crossing over, or NOBODY.
         weight, normal, gap, du: as in `Crossing`.
         rest: depth at which a spring that begins is free of force [m].
-        force, tangential, stiffness, energy, owed: of the spring `before` in the last step [N], [N/m], [J].
+        force, tangential, stiffness, energy: of the spring `before` in the last step [N], [N/m], [J].
     """
 
     edge: wp.array(dtype=wp.int32)
@@ -45,7 +45,6 @@ class Met:
     tangential: wp.array(dtype=wp.vec3d)
     stiffness: wp.array(dtype=wp.float64)
     energy: wp.array(dtype=wp.float64)
-    owed: wp.array(dtype=wp.float64)
 
 
 @wp.struct
@@ -124,7 +123,6 @@ def take_over(place: int, before: int, spring: Spring, met_out: Met):
     met_out.tangential[place] = spring.tangential[before]
     met_out.stiffness[place] = spring.stiffness[before]
     met_out.energy[place] = spring.energy[before]
-    met_out.owed[place] = spring.owed[before]
 
 
 @cache

@@ -20,7 +20,6 @@ def clear(s: int, spring: Spring):
     zero = wp.float64(0.0)
     spring.energy[s] = zero
     spring.normal_energy[s] = zero
-    spring.owed[s] = zero
     spring.force[s] = wp.vec3d()
     spring.tangential[s] = wp.vec3d()
     spring.face[s] = -1
@@ -76,7 +75,6 @@ def press_kernel(friction: bool, each: bool, laws: Laws) -> Any:
                     spring.force[s] = met.force[s]
                     spring.tangential[s] = met.tangential[s]
                     spring.energy[s] = met.energy[s]
-                    spring.owed[s] = met.owed[s]
                     spring.face[s] = b
                 else:
                     b = int(-1)

@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.contact.balance import energy_made, take_back_function
+from warp_mca.kernels.contact.balance import energy_made
 from warp_mca.kernels.contact.dashpot import dashpot_function
 from warp_mca.kernels.contact.friction import release, stick_slip
 from warp_mca.kernels.contact.friction_laws import limit_function
@@ -29,7 +29,7 @@ class Spring:
     became softer [J]. rest: depth at which it is free of force [m], only where bodies that overlap start stress-free,
     and of masters with several sides. normal_energy: the part of `energy` that the normal spring holds [J].
     parameters: of the contact law [SI units], shape (spring_count, parameter_count). made: energy that it made so far,
-    see `balance.energy_made` [J]. owed: the part of it that its force has still to take back [J]. left: compression
+    see `balance.energy_made` [J]. left: compression
     with which the side pressed the node last, until it is in front of that side, below it without being pressed, or
     pressed by another [m]. support, share: the slave's edge that the spring presses in place of its node, or -1, and
     the node's share of the force [-]; see `edge_rest`. bears: 1 where the side was the last to press the node itself,
@@ -57,7 +57,6 @@ class Spring:
     normal_energy: wp.array(dtype=wp.float64)
     parameters: wp.array2d(dtype=wp.float64)
     made: wp.array(dtype=wp.float64)
-    owed: wp.array(dtype=wp.float64)
     left: wp.array(dtype=wp.float64)
     support: wp.array(dtype=wp.int32)
     share: wp.array(dtype=wp.float64)
@@ -109,7 +108,7 @@ def spring_function(friction: bool, laws: Laws) -> Any:
     law_force, law_energy = functions.force, functions.energy
     damped = functions.dashpot is not None
     damp = dashpot_function(laws.normal) if damped else None
-    take_back, pressure = take_back_function(laws.normal), pressure_function(friction)
+    pressure = pressure_function(friction)
     friction_limit = limit_function(laws.friction) if by_laws else None
 
     @wp.func
@@ -158,11 +157,6 @@ def spring_function(friction: bool, laws: Laws) -> Any:
         if k < k_old:
             share, lost = soften(s, gap, normal, du, k_old, k, spring)
             spent += lost
-        made = energy_made(s, Fn * normal, stored, spent, du, spring)
-        if wp.static(friction):  # without what the tangential spring had, and did in this step
-            made += release(spring.tangential[s], du, k_old)
-        change, owed = take_back(s, -gap, -wp.dot(du, normal), Fn, made, k, spring)
-        Fn += change
         force = Fn * normal
         energy = stored
         if wp.static(friction):
@@ -183,7 +177,6 @@ def spring_function(friction: bool, laws: Laws) -> Any:
         if wp.static(friction):
             spring.tangential[s] = Ft
         spring.made[s] = made_before + made
-        spring.owed[s] = owed + made
         spring.energy[s] = energy
         spring.normal_energy[s] = stored
         spring.force[s] = force
@@ -214,7 +207,6 @@ def open_function(friction: bool, laws: Laws = PLAIN) -> Any:
             spring.tangential[s] = wp.vec3d()
         made = energy_made(s, wp.vec3d(), zero, spent, du, spring)
         spring.made[s] = spring.made[s] + made
-        spring.owed[s] = spring.owed[s] + made
         spring.energy[s] = zero
         spring.force[s] = wp.vec3d()
         spring.face[s] = -1

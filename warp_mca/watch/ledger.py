@@ -185,7 +185,7 @@ class Ledger:
     def _balance(self, sums: Array) -> tuple[Array, Array, Array]:
         """Imbalance of each row of sums; what counts of it; both over initial energy and external work [-]; these [J].
 
-        Of what contact springs made, which they take back as far as they can, 1 / MOST counts.
+        Of what contact springs made 1 / MOST counts: it goes with the step, and with the penalty.
         """
         energy = self._energies(sums)
         work = energy.pop("external_work")

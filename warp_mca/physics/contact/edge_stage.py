@@ -86,7 +86,7 @@ class EdgeStage(ContactStage):
         found, count = edge_meet.Met(), int(self.springs[-1])
         kinds = {"edge": wp.int32, "before": wp.int32, "weight": wp.vec4d}
         kinds |= dict.fromkeys(("normal", "du", "force", "tangential"), wp.vec3d)
-        kinds |= dict.fromkeys(("gap", "rest", "stiffness", "energy", "owed"), wp.float64)
+        kinds |= dict.fromkeys(("gap", "rest", "stiffness", "energy"), wp.float64)
         for name, kind in kinds.items():
             setattr(found, name, wp.zeros(count, dtype=kind))
         found.taken = wp.full(count, edge_meet.NOBODY, dtype=wp.int32)

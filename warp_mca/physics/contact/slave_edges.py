@@ -25,7 +25,7 @@ def new_springs(count: int, sided: int, stage: ContactStage) -> Any:
     Where some begin free of stress, their resting depth is 0.
     """
     found = spring.Spring()
-    numbers = "energy friction drive normal_impulse stick_impulse depth lost made owed stiffness normal_energy"
+    numbers = "energy friction drive normal_impulse stick_impulse depth lost made stiffness normal_energy"
     for name in ("tangential", "force", "impulse"):
         setattr(found, name, wp.zeros(count, dtype=wp.vec3d))
     for name in numbers.split():
