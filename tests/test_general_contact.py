@@ -159,13 +159,6 @@ def test_bodies_that_overlap_at_the_start_are_refused() -> None:
     mca.run(replace(scene, bodies=(*scene.bodies[:2], low), contacts=(mca.ContactAll(initial_overlap="stress_free"),)))
 
 
-def test_bodies_about_to_pass_between_nodes_are_refused() -> None:
-    scene = rods("all")
-    coarse = tuple(replace(body, geometry=replace(body.geometry, axial=1)) for body in scene.bodies)
-    with pytest.raises(mca.RequestError, match="could pass between the nodes unseen"):
-        mca.run(replace(scene, bodies=coarse))
-
-
 def test_in_files_batches_and_threads(tmp_path) -> None:
     scene = bricks((mca.ContactAll(mu=0.2, exclude=[("a", "b")]),))
     alone = mca.run(scene, threads=1)

@@ -92,7 +92,7 @@ def _(beyond: bool) -> list[str]:
 
 @pair(guards.energy_imbalance)
 def _(beyond: bool) -> list[str]:
-    return run(flat_cube(penalty=10.0, scale=0.9 if beyond else 0.2))
+    return run(flat_cube(penalty=30.0, scale=0.9 if beyond else 0.1))
 
 
 @pair(guards.no_number_at_the_start)

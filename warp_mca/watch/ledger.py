@@ -207,7 +207,8 @@ class Ledger:
         self.kept.exchanged = float(np.maximum(moved, stored - energy["kinetic"]).max(initial=self.kept.exchanged))
         scale = np.maximum(scale, self.rounding)
         shares = np.zeros((2, len(sums)))
-        np.divide([imbalance, np.maximum(np.abs(net - made), imbalance / MOST)], scale, out=shares, where=scale > 0.0)
+        counted = np.maximum(np.minimum(imbalance, np.abs(net - made)), imbalance / MOST)
+        np.divide([imbalance, counted], scale, out=shares, where=scale > 0.0)
         return shares[0], shares[1], scale
 
     @property
