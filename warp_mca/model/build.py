@@ -58,14 +58,15 @@ def _contacts(
         contact = replace(contact, two_way=is_two_way(contact, slave, master))
         contact, chosen = settled(parts, contact, slave, master, velocity)
         penalties.append(chosen)
-        for item in contact_passes(contact, index, slave, master):
+        found = contact_passes(contact, index, slave, master)
+        for item in found:
             sides = (slave, master) if item.sign > 0.0 else (master, slave)
             assert sides[0] is not None
             nodes, value = contact_eigenvalues(item, sides[0], sides[1], parts.mass)
             np.add.at(added, nodes, bounce_factor(contact, parts.scene) * value)
             decay = item.damping * float(value.max()) / item.stiffening if item.damping else 0.0
             passes.append(replace(item, decay=decay))
-        if master is not None and (edges := edge_pass(parts.X, passes[-1 - contact.two_way], slave, master, contact)):
+        if master is not None and (edges := edge_pass(parts.X, found[0], slave, master, contact)):
             nodes, value = edge_eigenvalues(edges, parts.mass)
             added[nodes] += bounce_factor(contact, parts.scene) * value
             passes.append(edges)

@@ -71,7 +71,7 @@ class EdgeStage(ContactStage):
         mine, theirs = self._join("slave_edge"), self._join("master_edge")
         self.node, offset, edge = _rows(
             np.concatenate([mine.ravel(), theirs.ravel()]),
-            np.concatenate([np.repeat(np.arange(len(mine)), 2), -1 - np.repeat(np.arange(len(theirs)), 2)]),
+            np.repeat(np.concatenate([np.arange(len(mine)), -1 - np.arange(len(theirs))]), 2).astype(np.int32),
         )
         self.offset, self.edge = wp.array(offset, dtype=wp.int32), wp.array(edge, dtype=wp.int32)
         self.nodes = wp.array(self.node, dtype=wp.int32)
