@@ -155,5 +155,5 @@ def _contact(rng: np.random.Generator, slave: int) -> tuple[tuple[mca.Contact, .
     skins = [mca.Surface(body=name, nodes="boundary") for name in NAMES]
     if general and hasattr(mca, "ContactAll"):
         return (mca.ContactAll(mu=mu),), {"contact": "all", "mu": mu}
-    contact = mca.Contact(slave=skins[slave], master=skins[1 - slave], mu=mu, two_way=two_way)
-    return (contact,), {"contact": "two-way" if two_way else "one-way", "slave": NAMES[slave], "mu": mu}
+    contact = mca.Contact(slave=skins[slave], master=skins[1 - slave], mu=mu, two_way=two_way or None)
+    return (contact,), {"contact": "two-way" if two_way else "listed", "slave": NAMES[slave], "mu": mu}
