@@ -146,3 +146,23 @@ def test_equal_bodies_at_one_place_are_refused(divisions: int, move: float):
             mca.RequestError, match=r"cells of one body lie inside .*\(\d+ of them, .*: move the bodies"
         ):
             mca.run(scene)
+
+
+@pytest.mark.parametrize("end", [0.9, 0.2])
+@pytest.mark.parametrize("at", [(0.006, -0.014, -0.003), (-0.0061, -0.003, -0.003)])
+@pytest.mark.parametrize("contacts", ["listed", "all"])
+def test_nodes_behind_a_face_that_leans_but_outside_of_its_body_are_free(end: float, at: tuple, contacts: str):
+    """The far face of a tapered plate took nodes 8 mm beside it, and scenes were refused."""
+    mesh = mca.Box(size=(0.0114, 0.0026, 0.023), divisions=(2, 1, 2), origin=(0.0, -0.0013, -0.0115)).build()
+    x = mesh.points.copy()
+    x[:, 1] *= end + (1.0 - end) * x[:, 0] / 0.0114
+    plate = mca.Body(name="plate", geometry=mca.Mesh(x, mesh.hexahedra), material=STEEL)
+    box = mca.Box(size=(0.006, 0.006, 0.006), divisions=(6, 6, 6), origin=at)
+    cube = mca.Body(name="cube", geometry=box, material=STEEL)
+    skins = [mca.Surface(body=name, nodes="boundary") for name in ("cube", "plate")]
+    listed = (mca.Contact(slave=skins[0], master=skins[1]),)
+    impact = mca.ImpactPhase(duration=1e-6, output_interval=1e-6)
+    scene = mca.Scene(
+        name="beside", bodies=(plate, cube), contacts="all" if contacts == "all" else listed, impact=impact
+    )
+    assert mca.run(scene).summary["extremes"]["F_n_max"] == 0.0

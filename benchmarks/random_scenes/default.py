@@ -60,7 +60,9 @@ def default(seed: int) -> Plain:
         bodies.append(_partner(rng, what, width, cells, bodies[0]))
         master = mca.Surface(body="other", nodes="boundary")
     two_way = bool(what != "plane" and rng.random() < 0.5)
-    contact = mca.Contact(slave=mca.Surface(body="one", nodes="boundary"), master=master, mu=mu, two_way=two_way or None)
+    contact = mca.Contact(
+        slave=mca.Surface(body="one", nodes="boundary"), master=master, mu=mu, two_way=two_way or None
+    )
     duration = _duration(bodies, kind, speed, gap, width, tilt)
     scene = mca.Scene(
         name=f"default {seed}",

@@ -62,6 +62,13 @@ def settle_initial_overlap(ready: Sequence[Prepared], solver: Solver, state: Sta
         slaves = np.concatenate([np.repeat(item.slave, stage.sides) for item in stage.items])
         for scene, item in enumerate(stage.items):
             mine = slice(int(stage.springs[scene]), int(stage.springs[scene + 1]))
+            if not stage.on_plane and (depth[mine] > _rounding(stage, scene, solver)).any():
+                outside = _outside(slaves[mine], depth[mine], ready[scene], stage, scene, solver)
+                depth[mine][outside] = energy[mine][outside] = 0.0
+                held = state.contacts[stage.index].spring.held
+                kept = held.numpy()
+                kept[mine][outside] = 0.0  # in front of all faces
+                held.assign(kept)
             if item.initial_overlap == "refuse":
                 least = _rounding(stage, scene, solver)
                 found = _found(slaves[mine], depth[mine], energy[mine], least)
@@ -106,6 +113,23 @@ def _found(slaves: NDArray[np.int32], depth: Array, energy: Array, least: float)
     deepest = int(depth.argmax())
     count = len(np.unique(slaves[inside]))
     return Overlap(count, int(slaves[deepest]), float(depth[deepest]), float(energy.sum()))
+
+
+def _outside(
+    slaves: NDArray[np.int32], depth: Array, ready: Prepared, stage: ContactStage, scene: int, solver: Solver
+) -> NDArray[np.bool_]:
+    """Springs whose node lies outside of closed masters, though behind the plane of a face that leans."""
+    found, least = depth > 0.0, _rounding(stage, scene, solver)
+    for body, nodes in {(master.body, master.nodes) for _, master in _surfaces(ready, stage.items[scene])}:
+        mesh, first = ready.meshes[body], int(solver.layout.nodes[scene]) + ready.model.node_start[body]
+        skin = mesh.boundary[0]
+        if len(mesh.surface(nodes)[0]) != len(skin):  # an open surface does not tell inside from outside
+            return np.zeros(len(depth), dtype=bool)
+        x = solver.model.X[first : first + len(mesh.points)]
+        found[found] = depths_below(solver.model.X[slaves[found]], x, triangulated(skin)) < -least
+        if not found.any():
+            break
+    return found
 
 
 def _or_behind(
