@@ -29,14 +29,18 @@ def measure(task: Task) -> Row:
     import warp as wp
 
     setattr(wp.config, "quiet", True)  # noqa: B010
-    logging.getLogger("warp_mca").setLevel(logging.ERROR)
     row: Row = {"family": task[0], "seed": task[1], "device": task[2], "kinds": [], "cells": []}
     begun = time.perf_counter()
+    log = logging.getLogger("warp_mca")
+    level = log.level
+    log.setLevel(logging.ERROR)  # rows keep the warnings
     try:
         return row | judged(task)
     except Exception as error:  # which must not end the runs of other scenes
         wall = round(time.perf_counter() - begun, 2)
         return row | {"status": "failed", "said": [f"{type(error).__name__}: {error}"], "wall": wall}
+    finally:
+        log.setLevel(level)
 
 
 def judged(task: Task) -> Row:
