@@ -15,6 +15,7 @@ from warp_mca.geometry.mesh import Mesh
 from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.model.stable_step import Elements, StableStep, at_elements, element_steps, stable_step
 from warp_mca.model.viscosity import viscosities
+from warp_mca.physics.contact.stiffness import Inertia
 from warp_mca.physics.contact.surfaces import Faces, make_faces
 from warp_mca.physics.elements import Element
 from warp_mca.physics.elements.cells import Cells, body_cells, body_materials, densities, element_masses, sum_to_nodes
@@ -227,6 +228,11 @@ class Assembly:
     def nodes(self, body: str, name: str) -> Index:
         """Nodes of a set of a body's mesh."""
         return self.meshes[body].nodes(name) + self.node_start[body]
+
+    @property
+    def inertia(self) -> Inertia:
+        """Masses of the nodes and the elements."""
+        return Inertia(self.mass, self.rho * self.volume)
 
     def faces(self, surface: Surface) -> Faces:
         """Boundary faces of a surface."""

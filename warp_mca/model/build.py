@@ -66,7 +66,7 @@ def _contacts(
             np.add.at(added, nodes, bounce_factor(contact, parts.scene) * value)
             decay = item.damping * float(value.max()) / item.stiffening if item.damping else 0.0
             passes.append(replace(item, decay=decay))
-        if master is not None and (edges := edge_pass(parts.X, found[0], slave, master, contact)):
+        if master is not None and (edges := edge_pass(parts.X, parts.inertia, found[0], slave, master, contact)):
             nodes, value = edge_eigenvalues(edges, parts.mass)
             added[nodes] += bounce_factor(contact, parts.scene) * value
             passes.append(edges)

@@ -28,6 +28,7 @@ def general_passes(parts: Assembly, contact: ContactAll, index: int) -> tuple[li
 
     Its springs are those that a two-way `Contact` of each pair would have.
     """
+    assert not isinstance(contact.penalty, str)  # a scene refuses it
     pairs = parts.scene.general_pairs()
     names = [body.name for body in parts.scene.bodies if any(body.name in pair for pair in pairs)]
     skins = [parts.faces(Surface(body=name, nodes="boundary")) for name in names]
@@ -37,7 +38,7 @@ def general_passes(parts: Assembly, contact: ContactAll, index: int) -> tuple[li
     for one, other in pairs:
         a, b = number[one], number[other]
         default = CURVED if a != b and (curved[a] or curved[b]) else 0.5 * FLAT  # two equal layers in series
-        factor[a, b] = factor[b, a] = 0.5 * (default if contact.penalty is None else float(contact.penalty))
+        factor[a, b] = factor[b, a] = 0.5 * (default if contact.penalty is None else contact.penalty)
     union = Faces(*(np.concatenate([getattr(skin, name) for skin in skins]) for name in Faces.__dataclass_fields__))
     own = union.contact if contact.penalty is None else union.bulk
     item = surface_pass(contact, index, union, union, node_mean(union.nodes, union, own), own, 0.0)
@@ -51,7 +52,7 @@ def general_passes(parts: Assembly, contact: ContactAll, index: int) -> tuple[li
     found = Pairs(body=body, face=faces, factor=factor, barred_offset=offset, barred=barred)
     item = replace(item, room=room, pairs=found)
     added = _eigenvalues(parts.mass, item, union)
-    edges = general_edges(parts.X, item, union, own)
+    edges = general_edges(parts.X, parts.inertia, item, union, contact.penalty)
     if edges is None:
         return [item], added
     nodes, value = edge_eigenvalues(edges, parts.mass)

@@ -12,13 +12,12 @@ from warp_mca.base.arrays import Array, Index
 from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.kernels.contact.edge_pairs import SLOTS
 from warp_mca.physics.contact.sides import SHARP, neighbours
-from warp_mca.physics.contact.stiffness import spring_stiffness
+from warp_mca.physics.contact.stiffness import Inertia, edge_stiffness
 from warp_mca.physics.contact.surfaces import ContactPass, Faces
 from warp_mca.scene import Contact
 
 BLUNT = math.radians(3.0)  # angle between the faces beside an edge from which on it may press another
 WIDER = 1.5  # ratio of widths of the slave's and the master's faces from which on the master's nodes could pass unseen
-SHARE = 0.25  # stiffness of a crossing over that of a node: a node that is pressed may bear a crossing as well
 COARSE = 0.5  # length of an edge that nodes see pass, as a share of the radius of what passes, at most
 
 
@@ -141,11 +140,14 @@ def no_edges(first: ContactPass) -> EdgePass:
     )
 
 
-def edge_pass(X: Array, first: ContactPass, slave: Faces, master: Faces, contact: Contact) -> EdgePass | None:
+def edge_pass(
+    X: Array, inertia: Inertia, first: ContactPass, slave: Faces, master: Faces, contact: Contact
+) -> EdgePass | None:
     """The pass of the edges of two surfaces beside that of their nodes, or None where nodes see all that can touch.
 
     Args:
         X: positions [m], shape (node_count, 3).
+        inertia: masses of the model.
         first: pass of the slave's nodes.
         slave, master: the surfaces.
         contact: whose pass it is.
@@ -154,31 +156,40 @@ def edge_pass(X: Array, first: ContactPass, slave: Faces, master: Faces, contact
     kept, met = _kept(mine, theirs), _kept(theirs, mine)
     if not (kept.any() and met.any()):
         return None
-    (_, own), (_, other) = spring_stiffness(replace(contact, two_way=False), slave, master)
-    return _pass(first, slave, master, mine.some(kept), theirs.some(met), own, other)
+    assert not isinstance(contact.penalty, str)  # `auto_penalty.settled` has replaced it
+    return _pass(first, slave, master, mine.some(kept), theirs.some(met), contact.penalty, inertia)
 
 
-def general_edges(X: Array, first: ContactPass, union: Faces, own: Array) -> EdgePass | None:
+def general_edges(
+    X: Array, inertia: Inertia, first: ContactPass, union: Faces, penalty: float | None
+) -> EdgePass | None:
     """The pass of the edges of all bodies beside that of their nodes in a general contact.
 
     Args:
         X: positions [m], shape (node_count, 3).
+        inertia: masses of the model.
         first: pass of the nodes, which knows the pairs.
         union: skins of all bodies.
-        own: penalty stiffness of a node on each face for a factor of 1 [N/m], shape (face_count,).
+        penalty: of the contact.
     """
     edges = skin_edges(X, union)
     edges = edges.some(_kept(edges, edges))
     if not len(edges.node):
         return None
     assert first.pairs is not None
-    found = _pass(first, union, union, edges, edges, 2.0 * own, 2.0 * own)  # a pair has half of it in either direction
+    found = _pass(first, union, union, edges, edges, penalty, inertia)
     body = first.pairs.face[edges.face[:, 0]]
-    return replace(found, slave_body=body, master_body=body, factor=first.pairs.factor)
+    return replace(found, slave_body=body, master_body=body, factor=np.sign(first.pairs.factor))
 
 
 def _pass(
-    first: ContactPass, slave: Faces, master: Faces, mine: SkinEdges, theirs: SkinEdges, own: Array, other: Array
+    first: ContactPass,
+    slave: Faces,
+    master: Faces,
+    mine: SkinEdges,
+    theirs: SkinEdges,
+    penalty: float | None,
+    inertia: Inertia,
 ) -> EdgePass:
     place = np.searchsorted(first.slave, mine.node[:, 0])
     friction = first.friction_parameters[place] if len(first.friction_parameters) else first.friction_parameters
@@ -186,7 +197,7 @@ def _pass(
         **_shared(first),
         slave=mine.node[:, 0],
         master=np.unique(theirs.node).astype(np.int32),
-        stiffness=SHARE * own[mine.face].mean(axis=1),
+        stiffness=edge_stiffness(penalty, slave, mine.face, mine.node, inertia),
         friction_parameters=friction,
         slave_edge=mine.node,
         master_edge=theirs.node,
@@ -194,7 +205,7 @@ def _pass(
         master_beside=master.node[theirs.face].reshape(-1, 8),
         slave_size=mine.size,
         master_size=theirs.size,
-        master_stiffness=SHARE * other[theirs.face].mean(axis=1),
+        master_stiffness=edge_stiffness(penalty, master, theirs.face, theirs.node, inertia),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,14 @@ if TYPE_CHECKING:
 # are stiffer ring, because they close more quickly than waves leave the first cells. Few nodes carry a curved contact,
 # so that softer springs lower its force peak: at nu = 0.3 it has penalty = 5; see docs/measurements/methods.md.
 FLAT, CURVED = 0.5, 3.792
+SHARE = 0.16  # stiffness of two edges that cross over that of a node: its ends may bear a node and a crossing at once
+
+
+class Inertia(NamedTuple):
+    """Masses of a model [kg]: of its nodes, shape (node_count,), and of its elements, shape (element_count,)."""
+
+    node: Array
+    element: Array
 
 
 def nearest_faces(contact: Contact, slave: Faces, master: Faces | None) -> tuple[int, int]:
@@ -57,6 +65,24 @@ def spring_stiffness(contact: Contact, slave: Faces, master: Faces | None) -> li
         assert not isinstance(contact.penalty, str)  # `auto_penalty.settled` has replaced it
         factor, found = half * contact.penalty, [faces.bulk for faces in surfaces]
     return [(factor * node_mean(faces.nodes, faces, k), factor * k) for faces, k in zip(surfaces, found, strict=True)]
+
+
+def edge_stiffness(penalty: float | None, faces: Faces, beside: Index, ends: Index, inertia: Inertia) -> Array:
+    """Penalty stiffness of edges that may cross others [N/m], shape (edge_count,).
+
+    One spring alone bears a crossing, as few bear a curved contact, so the default is a share of theirs, flat faces or
+    not. It is less where an end has less than a quarter of the mass of a cell beside it, as corners have.
+
+    Args:
+        penalty: of the contact.
+        faces: of the edge's surface.
+        beside: the two faces beside each edge, shape (edge_count, 2).
+        ends: nodes at the ends of each edge, shape (edge_count, 2).
+        inertia: of the model.
+    """
+    own = SHARE * (CURVED * faces.contact if penalty is None else penalty * faces.bulk)
+    quarter = 0.25 * inertia.element[faces.element[beside]].mean(axis=1)
+    return own[beside].mean(axis=1) * np.minimum(1.0, inertia.node[ends].min(axis=1) / quarter)
 
 
 def _node_shares(faces: Faces, nearest: int) -> Array:
