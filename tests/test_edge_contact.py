@@ -139,3 +139,12 @@ def test_a_general_contact_has_the_crossings_of_a_listed_pair():
     assert listed.summary["F_n_max"] > 5e3
     assert everything.summary["F_n_max"] == pytest.approx(listed.summary["F_n_max"], rel=0.02)
     assert everything.summary["energy_error"] < 1e-3
+
+
+@pytest.mark.gpu
+@pytest.mark.parametrize("scene", [crossed(13, 2, mu=0.3), crossed(7, 1, turn=40.0, rigid=True)], ids=["mu", "rigid"])
+def test_a_device_gives_the_motion_of_the_cpu_and_the_same_bits_twice(scene: mca.Scene) -> None:
+    cpu, cuda, again = (mca.run(scene, device=device) for device in ("cpu", "cuda:0", "cuda:0"))
+    assert all(np.array_equal(cuda[name], again[name], equal_nan=True) for name in cuda.history)
+    for name in ("F_n_N", "E_kinetic", "E_friction"):
+        assert cuda[name] == pytest.approx(cpu[name], abs=1e-4 * max(np.abs(cpu[name]).max(), 1e-9))
