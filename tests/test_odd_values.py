@@ -48,6 +48,7 @@ SOUND: dict[type, Any] = {
     mca.ContactAll: mca.ContactAll(mu=0.3, exclude=(("low", "low"),)),
     mca.Contact: mca.Contact(slave=mca.Surface(body="up", nodes="ymin"), master=TOP, mu=0.3, penalty=1.0),
     mca.Penalty: mca.Penalty(),
+    mca.DampedPenalty: mca.DampedPenalty(time=1e-6, speed=0.1),
     mca.DecayingFriction: mca.DecayingFriction(kinetic=0.2, decay=2.0),
     mca.ShearCap: mca.ShearCap(tau_max=1e8),
     mca.Revolute: mca.Revolute(name="O", body="up", at=(0.0, 0.0, 0.0)),
@@ -163,7 +164,7 @@ def scene_with(item: Any) -> mca.Scene:
             change = {"bodies": (item, up)}
         case Joint():
             change = {"joints": (item,)}
-        case mca.Penalty():
+        case mca.Penalty() | mca.DampedPenalty():
             change = {"contacts": (dataclasses.replace(SOUND[mca.Contact], law=item),)}
         case mca.DecayingFriction() | mca.ShearCap():
             change = {"contacts": (dataclasses.replace(SOUND[mca.Contact], friction=item),)}

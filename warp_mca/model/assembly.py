@@ -229,6 +229,11 @@ class Assembly:
         """Nodes of a set of a body's mesh."""
         return self.meshes[body].nodes(name) + self.node_start[body]
 
+    def all_nodes(self, body: str) -> slice:
+        """All nodes of a body."""
+        first = self.node_start[body]
+        return slice(first, first + len(self.meshes[body].points))
+
     @property
     def inertia(self) -> Inertia:
         """Masses of the nodes and the elements."""

@@ -18,6 +18,7 @@ from warp_mca.model.model import Model
 from warp_mca.physics.contact.skin_edges import EdgePass, no_edges
 from warp_mca.physics.contact.surfaces import ContactPass
 from warp_mca.physics.loads.nodal import check_batch
+from warp_mca.scene.contact_laws import DampedPenalty, Penalty
 
 # what the numbers in a model's arrays count, and how many of them a model has
 _COUNTS: dict[str, Callable[[Model], int]] = {
@@ -69,6 +70,9 @@ def join_models(models: Sequence[Model]) -> Model:
 def with_alike_passes(models: Sequence[Model]) -> list[Model]:
     """Models of which each has a pass of edges, perhaps an empty one, where another's contact has one.
 
+    So with dashpots: where bodies of one scene rest on each other, a contact that another scene leaves to the program
+    has one that takes nothing.
+
     Raises:
         RequestError: a contact keeps out the nodes of both sides in some models only.
     """
@@ -79,7 +83,13 @@ def with_alike_passes(models: Sequence[Model]) -> list[Model]:
                 f"contacts of scenes[{k}]", len(own), "some are two-way in it only: give two_way in all scenes"
             )
     edged = {item.contact for model in models for item in model.passes if isinstance(item, EdgePass)}
-    return [replace(model, passes=_padded(model.passes, edged)) for model in models]
+    damped = {item.contact for model in models for item in model.passes if item.law == DampedPenalty.law}
+    return [replace(model, passes=_padded(_damped(model.passes, damped), edged)) for model in models]
+
+
+def _damped(passes: Sequence[ContactPass], damped: Collection[int]) -> list[ContactPass]:
+    idle = {"law": DampedPenalty.law, "parameters": (0.0, 0.0), "damping": np.finfo(float).tiny}
+    return [replace(item, **idle) if item.contact in damped and item.law == Penalty.law else item for item in passes]
 
 
 def _padded(passes: Sequence[ContactPass], edged: Collection[int]) -> tuple[ContactPass, ...]:

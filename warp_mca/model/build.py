@@ -20,6 +20,7 @@ from warp_mca.physics.contact.auto_penalty import ChosenPenalty, settled
 from warp_mca.physics.contact.axes import contact_axes
 from warp_mca.physics.contact.eigenvalues import contact_eigenvalues
 from warp_mca.physics.contact.general import general_passes
+from warp_mca.physics.contact.resting import resting
 from warp_mca.physics.contact.skin_edges import edge_eigenvalues, edge_pass, is_two_way
 from warp_mca.physics.contact.surfaces import ContactPass, contact_passes
 from warp_mca.physics.joints.constraints import check_bindings, constraints, free_nodes, join_bodies, nodes_of
@@ -47,7 +48,7 @@ def _contacts(
     added = np.zeros(len(parts.X))
     for index, contact in enumerate(parts.scene.contacts):
         if isinstance(contact, ContactAll):
-            found, value = general_passes(parts, contact, index)
+            found, value = general_passes(parts, contact, index, velocity)
             added += value
             decay = found[0].damping * float(value.max()) / found[0].stiffening if found[0].damping else 0.0
             passes += [replace(item, decay=decay) for item in found]
@@ -58,6 +59,7 @@ def _contacts(
         contact = replace(contact, two_way=is_two_way(contact, slave, master))
         contact, chosen = settled(parts, contact, slave, master, velocity)
         penalties.append(chosen)
+        contact = resting(parts, contact, slave, master, velocity)
         found = contact_passes(contact, index, slave, master)
         for item in found:
             sides = (slave, master) if item.sign > 0.0 else (master, slave)

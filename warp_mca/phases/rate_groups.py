@@ -14,6 +14,7 @@ from warp_mca.base.errors import bad_value
 from warp_mca.model.own_steps import OwnSteps
 from warp_mca.model.rates import Levels, Rates, follow, grouped
 from warp_mca.phases.division import divide
+from warp_mca.physics.contact.resting import undamped
 
 if TYPE_CHECKING:
     from warp_mca.model.build import Grouping
@@ -99,6 +100,8 @@ def grouping(scene: Scene, span: float, device: str, multi_rate: MultiRate) -> G
     most = MOST if multi_rate == "auto" else int(multi_rate)
 
     def choose(model: Model, own: OwnSteps) -> Model:
+        if multi_rate != "auto":  # the dashpots of bodies at rest, which the program added, take steps of one rate
+            model = undamped(model, scene)
         damped = any(item.damping for item in model.passes)
         if most > 1 and (damped or scene.phases):
             if multi_rate == "auto":

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import GuardError, bad_value
 from warp_mca.phases.division import MAX_STEPS, coarser
 from warp_mca.phases.stretch import Stretch, stretch_ended
-from warp_mca.scene import Settle
+from warp_mca.scene import DampedPenalty, Settle
 
 if TYPE_CHECKING:
     from warp_mca.phases.impact import Impact
@@ -97,6 +97,11 @@ class HalfSteps:
         rigid = self.state.rigid
         self.places = [(self.state.u, waiting), (rigid.centre, bodies), (rigid.rotation, bodies)]
         self.start = [np.array(array.numpy()) for array, _ in self.places]
+        # dashpots of contacts wait: changes of velocity between steps would be lost from what they book
+        damped = [item for item in self.solver.contacts if item.laws.normal == DampedPenalty.law]
+        self.dashpots = [(item.parameters, np.array(item.parameters.numpy())) for item in damped]
+        for parameters, _ in self.dashpots:
+            parameters.zero_()
 
     def look(self) -> float:
         """Kinetic energy of the bodies that settle [J].
@@ -132,6 +137,8 @@ class HalfSteps:
 
     def release(self, scene_run: SceneRun) -> None:
         """Let bodies that waited have their velocities, in a state whose rows begin anew."""
+        for parameters, values in self.dashpots:
+            parameters.assign(values)
         kept, state = scene_run.ledger.kept, self.state
         at_rest = self.look()
         self._give(self.initial, False)

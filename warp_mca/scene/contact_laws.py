@@ -6,6 +6,8 @@ A law is plain, immutable data that names the module of its device functions. A 
 
 from __future__ import annotations
 
+import math
+import sys
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -50,12 +52,46 @@ class Penalty(ContactLaw):
         return 1.0
 
 
-def law_values(law: ContactLaw, depth: float) -> dict[str, Any]:
-    """The law, parameters, stiffening and damping that a contact pass has, for depths up to `depth` [m].
+@dataclass(frozen=True, kw_only=True)
+class DampedPenalty(ContactLaw):
+    """The linear spring and a dashpot beside it, F_n = k (g + time r), which never pull.
+
+    Attributes:
+        time: of the dashpot [s]. A share z of the critical damping of a node of mass m takes 2 z sqrt(m / k).
+        speed: bound of the rate of approach r, to either side [m/s]; inf for none.
+    """
+
+    time: float
+    speed: float = math.inf
+    law = "warp_mca.kernels.contact.damped_penalty"
+
+    def __post_init__(self) -> None:
+        validate.plain(self)
+        validate.positive("DampedPenalty", time=self.time)
+        if not (isinstance(self.speed, (int, float)) and self.speed > 0.0):
+            raise bad_value("DampedPenalty.speed", self.speed, "give a speed above 0, or inf for no bound")
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """The time [s] and the speed [m/s]."""
+        return self.time, min(self.speed, sys.float_info.max)
+
+    def stiffening(self, depth: float) -> float:
+        """As of the linear spring."""
+        return 1.0
+
+    def damping(self, depth: float) -> float:
+        """The time [s]."""
+        return self.time
+
+
+def law_values(law: ContactLaw | None, depth: float) -> dict[str, Any]:
+    """Law (None: `Penalty`), parameters, stiffening and damping that a contact pass has, for depths up to `depth` [m].
 
     Raises:
         RequestError: one of them is not what `ContactLaw` describes.
     """
+    law = law or Penalty()
     kind, name = type(law).__name__, getattr(law, "law", None)
     validate.kinds(kind, str, "name the module of its functions", law=name)
     parameters = validate.call(f"{kind}.law", name, "parameters", lambda: law.parameters)
@@ -69,4 +105,4 @@ def law_values(law: ContactLaw, depth: float) -> dict[str, Any]:
     return found
 
 
-CONTACT_LAWS: dict[str, type[ContactLaw]] = {kind.__name__: kind for kind in (Penalty,)}
+CONTACT_LAWS: dict[str, type[ContactLaw]] = {kind.__name__: kind for kind in (Penalty, DampedPenalty)}

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.scene.bodies import Vec3
-from warp_mca.scene.contact_laws import CONTACT_LAWS, ContactLaw, Penalty
+from warp_mca.scene.contact_laws import CONTACT_LAWS, ContactLaw
 from warp_mca.scene.friction_laws import FRICTION_LAWS, FrictionLaw
 
 MOST_FRICTION = 1e6  # with which nothing slides [-]
@@ -59,13 +59,13 @@ class _Springs:
     penalty: float | Literal["auto"] | None
     initial_overlap: Literal["refuse", "stress_free", "press"]
     name: str | None
-    law: ContactLaw
+    law: ContactLaw | None
     friction: FrictionLaw | tuple[FrictionLaw, ...]
 
     def _check_springs(self) -> None:
         owner = type(self).__name__
         validate.plain(self)
-        if type(self.law) not in CONTACT_LAWS.values():  # others are not registered
+        if self.law is not None and type(self.law) not in CONTACT_LAWS.values():  # others are not registered
             remedy = f"give a {' or a '.join(CONTACT_LAWS)}; register other classes by warp_mca.register"
             raise bad_value(f"{owner}.law", validate.brief(self.law), remedy)
         if isinstance(self.penalty, str):
@@ -108,7 +108,8 @@ class Contact(_Springs):
             f = 3.8 where a surface is curved. Where both are flat, nodes share, by their area, springs that are as
             stiff as two cells of each surface, so that flat ends do not ring. "auto" chooses f from mesh, curvature,
             mass and speed, so that springs hold at most some 7 % of the energy.
-        law: force along the normal over depth and stiffness; the linear spring k g by default.
+        law: force along the normal over depth and stiffness. None takes `Penalty`, or `DampedPenalty` where bodies lie
+            on each other under their weight, with half of critical damping up to the speeds that weight gives.
         friction: law that changes the limit mu F_n of the friction force, or several that do in turn, as
             (DecayingFriction(kinetic=0.2, decay=2.0), ShearCap(tau_max=1e8)); Coulomb's limit by default.
         two_way: whether the master's nodes are also kept out of the slave's faces. None does so where the slave's faces
@@ -133,7 +134,7 @@ class Contact(_Springs):
     name: str | None = None
     normal: Vec3 | None = None
     tangent: Vec3 | None = None
-    law: ContactLaw = field(default_factory=Penalty)
+    law: ContactLaw | None = None
     friction: FrictionLaw | tuple[FrictionLaw, ...] = ()
 
     def __post_init__(self) -> None:
@@ -178,7 +179,7 @@ class ContactAll(_Springs):
     penalty: float | Literal["auto"] | None = None
     initial_overlap: Literal["refuse", "stress_free", "press"] = "refuse"
     name: str | None = None
-    law: ContactLaw = field(default_factory=Penalty)
+    law: ContactLaw | None = None
     friction: FrictionLaw | tuple[FrictionLaw, ...] = ()
 
     def __post_init__(self) -> None:

@@ -141,8 +141,7 @@ def _yielding(parts: Assembly, name: str, place: Array, normal: Array) -> float:
 
     Joints are left out. A body that is held along other axes does not turn.
     """
-    first = parts.node_start[name]
-    nodes = slice(first, first + len(parts.meshes[name].points))
+    nodes = parts.all_nodes(name)
     X, mass = parts.X[nodes], parts.mass[nodes]
     axes = {axis for item in parts.scene.fixed if item.body == name for axis in item.axes}
     if axes:

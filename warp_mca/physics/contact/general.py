@@ -9,6 +9,7 @@ import numpy as np
 
 from warp_mca.base.arrays import Array, Index
 from warp_mca.physics.contact.pairs import SLOTS, Pairs
+from warp_mca.physics.contact.resting import at_rest
 from warp_mca.physics.contact.sides import is_curved
 from warp_mca.physics.contact.skin_edges import edge_eigenvalues, general_edges
 from warp_mca.physics.contact.stiffness import CURVED, FLAT, node_mean
@@ -22,7 +23,9 @@ DEEP = 2.0  # times the width of a face, as far behind which nodes of its own bo
 ASIDE = 1.0  # widths of a face, as far beside it
 
 
-def general_passes(parts: Assembly, contact: ContactAll, index: int) -> tuple[list[ContactPass], Array]:
+def general_passes(
+    parts: Assembly, contact: ContactAll, index: int, velocity: Array
+) -> tuple[list[ContactPass], Array]:
     """The pass of a general contact, that of its edges if some may cross, and what their springs can add to the
     largest eigenvalue at each node [1/s^2].
 
@@ -41,7 +44,9 @@ def general_passes(parts: Assembly, contact: ContactAll, index: int) -> tuple[li
         factor[a, b] = factor[b, a] = 0.5 * (default if contact.penalty is None else contact.penalty)
     union = Faces(*(np.concatenate([getattr(skin, name) for skin in skins]) for name in Faces.__dataclass_fields__))
     own = union.contact if contact.penalty is None else union.bulk
-    item = surface_pass(contact, index, union, union, node_mean(union.nodes, union, own), own, 0.0)
+    of_node = node_mean(union.nodes, union, own)
+    settled = at_rest(parts, contact, pairs, union.nodes, 2.0 * factor.max() * of_node, velocity)
+    item = surface_pass(settled, index, union, union, of_node, own, 0.0)
     slave_of = np.concatenate([np.full(len(skin.nodes), k) for k, skin in enumerate(skins)])
     order = np.argsort(np.concatenate([skin.nodes for skin in skins]))
     face_of = np.concatenate([np.full(len(skin.node), k) for k, skin in enumerate(skins)])
