@@ -68,8 +68,8 @@ class DampedPenalty(ContactLaw):
     def __post_init__(self) -> None:
         validate.plain(self)
         validate.positive("DampedPenalty", time=self.time)
-        if not (isinstance(self.speed, (int, float)) and self.speed > 0.0):
-            raise bad_value("DampedPenalty.speed", self.speed, "give a speed above 0, or inf for no bound")
+        if self.speed != math.inf:
+            validate.positive("DampedPenalty", speed=self.speed)
 
     @property
     def parameters(self) -> tuple[float, ...]:
