@@ -15,6 +15,7 @@ from warp_mca.scene import (
     Absorbing,
     BaseMotion,
     Body,
+    Bond,
     Contact,
     ContactAll,
     DampedPenalty,
@@ -91,6 +92,7 @@ _LAZY = {
 __all__ = [
     "Scene",
     "Body",
+    "Bond",
     "Elastic",
     "J2Bilinear",
     "Contact",

@@ -5,6 +5,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.contact.bond import HOLDS, hold
 from warp_mca.kernels.contact.laws import PLAIN, Laws
 from warp_mca.kernels.contact.nearest import Master, nearest_face
 from warp_mca.kernels.contact.pairs import Pairs, pair_factor
@@ -70,7 +71,15 @@ def surface_kernel(friction: bool, each: bool, laws: Laws = PLAIN, noted: bool =
         along = wp.vec3f(pressure(s, spring))
         near = nearest_face(X, u, master, s, X[i] + u[i], along)
         held = spring.held[s]
-        if near.face >= 0:
+        bonded = bool(False)
+        if wp.static(laws.bond):
+            bonded = spring.bond[s] == wp.static(HOLDS)
+            if bonded:
+                force = hold(s, i, k, X, u, v, master, stiffness[s], of(per_newton, k), dt, spring, normal_force_out)
+                nodal_force_out[i] = nodal_force_out[i] + force
+                if wp.static(noted):
+                    recent_out[i] = recent(recent_out[i], force)
+        if near.face >= 0 and not bonded:
             touch = meet_side(X, u, v, master, i, near, stiffness[s], dt, held, along)
             if wp.static(general):
                 factor = pair_factor(pairs, s, near.face)
@@ -80,7 +89,7 @@ def surface_kernel(friction: bool, each: bool, laws: Laws = PLAIN, noted: bool =
             nodal_force_out[i] = nodal_force_out[i] + force
             if wp.static(noted):
                 recent_out[i] = recent(recent_out[i], force)
-        else:
+        elif not bonded:
             let_go(s, i, v, master.face, dt, near.front, held, spring)
         if moved_too_far(u[i], u_search[i], of(margin, k)):
             flag_out[k, STALE] = 1

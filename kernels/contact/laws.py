@@ -22,10 +22,12 @@ class Laws(NamedTuple):
     Attributes:
         normal: of the force along the normal.
         friction: of the laws of friction, in the order in which they change its limit; none for Coulomb's alone.
+        bond: whether some slave nodes are glued, see `kernels.contact.bond`.
     """
 
     normal: str = LINEAR
     friction: tuple[str, ...] = ()
+    bond: bool = False
 
 
 PLAIN = Laws()

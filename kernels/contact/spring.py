@@ -36,7 +36,9 @@ class Spring:
     else 0 [-]. These four are only of masters with several sides. dashpot: force of the law's dashpot in the last step
     [N], and energy that it dissipated so far [J]; only of laws that have one. limit: of the friction force in the last
     step [N], and friction_parameters: of the laws of friction [SI units], shape (law_count spring_count,
-    parameter_count), those of spring 0 first; only of contacts with such laws.
+    parameter_count), those of spring 0 first; only of contacts with such laws. bond: 1 while a bond holds the node to
+    its place on `face`, -1 once it has failed, else 0; bond_time: that it has held [s]; bond_limit: forces in tension
+    and in shear at which it fails [N]; only of contacts with bonds.
     """
 
     tangential: wp.array(dtype=wp.vec3d)
@@ -64,6 +66,9 @@ class Spring:
     dashpot: wp.array(dtype=wp.vec2d)
     limit: wp.array(dtype=wp.float64)
     friction_parameters: wp.array2d(dtype=wp.float64)
+    bond: wp.array(dtype=wp.int32)
+    bond_time: wp.array(dtype=wp.float64)
+    bond_limit: wp.array(dtype=wp.vec2d)
 
 
 @cache

@@ -18,6 +18,7 @@ from warp_mca.model.viscosity import share_of_step, with_viscosity
 from warp_mca.physics.absorbing.nodes import absorbing_nodes
 from warp_mca.physics.contact.auto_penalty import ChosenPenalty, settled
 from warp_mca.physics.contact.axes import contact_axes
+from warp_mca.physics.contact.bonds import Place, bonded, on_bonds
 from warp_mca.physics.contact.eigenvalues import contact_eigenvalues
 from warp_mca.physics.contact.general import general_passes
 from warp_mca.physics.contact.resting import resting
@@ -38,7 +39,7 @@ Grouping = Callable[[Model, OwnSteps], Model]
 
 
 def _contacts(
-    parts: Assembly, velocity: Array
+    parts: Assembly, velocity: Array, places: Mapping[int, Place]
 ) -> tuple[tuple[ContactPass, ...], Array, Array, tuple[ChosenPenalty | None, ...]]:
     """Passes, the axes along which each contact's force is reported, what the springs add at each node, and penalties
     that were chosen."""
@@ -61,6 +62,9 @@ def _contacts(
         penalties.append(chosen)
         contact = resting(parts, contact, slave, master, velocity)
         found = contact_passes(contact, index, slave, master)
+        if index in places:
+            first = parts.node_start[contact.slave.body]
+            found = [bonded(found[0], contact, places[index], first, slave, parts.X)]
         for item in found:
             sides = (slave, master) if item.sign > 0.0 else (master, slave)
             assert sides[0] is not None
@@ -97,6 +101,7 @@ def build_model(
     Raises:
         RequestError: joints whose nodes do not coincide, nodes bound twice, unknown sets, cells without material.
     """
+    places, X = on_bonds(scene, meshes, X)
     ties = tied_nodes(scene, meshes, X)
     parts = Assembly(scene, meshes, on_faces(ties, scene, X))
     velocity = velocities(ties, scene, X, V)
@@ -108,7 +113,7 @@ def build_model(
         pairs["joint_tied"][base.start : base.end] = 0.0
     held = constraints(parts, velocity)
     check_bindings(parts, joints, held, pairs)
-    passes, axes, added, penalties = _contacts(parts, velocity)
+    passes, axes, added, penalties = _contacts(parts, velocity, places)
     absorbing = absorbing_nodes(parts, velocity, held, pairs)
     added[absorbing.node] += absorbing.eigenvalues(parts.mass)
     loads = loaded_nodes(parts, start, added, grouping is not None)

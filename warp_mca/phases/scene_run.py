@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from warp_mca.phases.history_rows import Rows, history_columns, joined, phase_facts, rows_of
 from warp_mca.phases.rate_groups import rate_figures
+from warp_mca.physics.contact.bonds import bond_reports
 from warp_mca.physics.elements.cells import body_materials
 from warp_mca.results.contact_history import contact_names
 from warp_mca.results.result import Result, summarise
@@ -164,6 +165,10 @@ class SceneRun:
             names = contact_names(scene.contacts)
             more["penalty"] = {name: vars(item) for name, item in zip(names, model.penalties, strict=True) if item}
         more |= {"contact_spring_share": dict(shares), "contact_spring_loss": peak_losses(shares)}
+        if any(item.bonds for item in model.passes):
+            names = contact_names(scene.contacts)
+            found = bond_reports(self.solver.contacts, self.state, self.index, self.solver.model.X)
+            more["bonds"] = {names[contact]: report for contact, report in found.items()}
         if scene.ties:
             more["ties"] = [dict(fact) for fact in self.ready.model.ties.facts]
         if scene.stress_paths:

@@ -6,6 +6,7 @@ and the remedy. Nothing here meshes, allocates or imports Warp.
 
 from warp_mca.scene.absorbing import Absorbing
 from warp_mca.scene.bodies import Body, Vec3
+from warp_mca.scene.bonds import Bond
 from warp_mca.scene.contact_laws import DampedPenalty, Penalty
 from warp_mca.scene.contacts import OVERLAP_CHOICES, Contact, ContactAll, RigidPlane, Surface
 from warp_mca.scene.drives import Fixed, Prescribed
@@ -22,6 +23,7 @@ __all__ = [
     "Absorbing",
     "BaseMotion",
     "Body",
+    "Bond",
     "Contact",
     "ContactAll",
     "DampedPenalty",

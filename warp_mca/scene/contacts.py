@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from types import NoneType
 from typing import Literal
 
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.scene.bodies import Vec3
-from warp_mca.scene.contact_laws import CONTACT_LAWS, ContactLaw
+from warp_mca.scene.bonds import Bond
+from warp_mca.scene.contact_laws import CONTACT_LAWS, ContactLaw, DampedPenalty, Penalty
 from warp_mca.scene.friction_laws import FRICTION_LAWS, FrictionLaw
 
 MOST_FRICTION = 1e6  # with which nothing slides [-]
@@ -123,6 +125,7 @@ class Contact(_Springs):
             master turns before the impact, or where only a part of a curved master is touched.
         tangent: direction that F_t_N reports [-], made perpendicular to the normal. None takes normal x z, or the
             perpendicular nearest to +x where the normal is within 20 degrees of the z axis.
+        bond: glue between the surfaces, which hold each other until it fails. Tension is a negative F_n_N.
     """
 
     slave: Surface
@@ -136,6 +139,7 @@ class Contact(_Springs):
     tangent: Vec3 | None = None
     law: ContactLaw | None = None
     friction: FrictionLaw | tuple[FrictionLaw, ...] = ()
+    bond: Bond | None = None
 
     def __post_init__(self) -> None:
         self._check_springs()
@@ -148,8 +152,19 @@ class Contact(_Springs):
         if isinstance(self.master, Surface) and self.master.body == self.slave.body:
             remedy = "name a body other than the slave's; ContactAll keeps a body out of itself"
             raise bad_value("Contact.master.body", self.master.body, remedy)
+        self._check_bond()
         axes = {"normal": self.normal, "tangent": self.tangent}
         validate.directions("Contact", **{name: axis for name, axis in axes.items() if axis is not None})
+
+    def _check_bond(self) -> None:
+        validate.kinds("Contact", (Bond, NoneType), "give a Bond or None", bond=self.bond)
+        for held, why in (
+            (isinstance(self.master, RigidPlane), "a rigid plane has no faces to glue to; fix the nodes instead"),
+            (self.two_way, "the slave's nodes alone are glued; leave two_way off"),
+            (not isinstance(self.law, Penalty | DampedPenalty | None), "its springs are linear; leave the contact's law out"),
+        ):
+            if self.bond and held:
+                raise bad_value("Contact.bond", self.bond, why)
 
     @property
     def sides(self) -> tuple[str, str]:

@@ -170,6 +170,7 @@ class Scene:
         for present, why in (
             (self.absorbing, "a cut body with absorbing sides does not move between impacts as the large one"),
             (self.loads, "loads act in an impact alone, not in the swings between"),
+            (any(item.bond for item in self.listed), "bonds act in an impact alone, not in the swings between"),
             (self.prescribed, "nodes with a Prescribed velocity cannot follow it between impacts"),
         ):
             if present:

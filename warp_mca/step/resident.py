@@ -73,7 +73,7 @@ def is_known(solver: Solver) -> bool:
     if contact is None:
         return True
     bound = np.concatenate([contact.items[0].master, contact.items[0].slave, _bound(solver)])
-    return not contact.on_plane and contact.sides == 1 and len(np.unique(bound)) == len(bound)
+    return not (contact.on_plane or contact.laws.bond) and contact.sides == 1 and len(np.unique(bound)) == len(bound)
 
 
 def _pins_fit(solver: Solver) -> bool:

@@ -65,7 +65,7 @@ def is_two_way(contact: Contact, slave: Faces, master: Faces | None) -> bool:
 
     That is the lesser of the ratio of the smallest and that of the usual: faces far from contact may be of any size.
     """
-    if contact.two_way is not None or master is None:
+    if contact.two_way is not None or contact.bond or master is None:
         return bool(contact.two_way)
     ratio = min(slave.area.min() / master.area.min(), np.median(slave.area) / np.median(master.area))
     return bool(math.sqrt(ratio) > WIDER)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from warp_mca.kernels.contact import contact, edge_shares, edges, spring
 from warp_mca.kernels.contact.laws import law_functions
+from warp_mca.physics.contact.bonds import glue
 from warp_mca.step.threads import CONTACT, Split
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ def new_springs(count: int, sided: int, stage: ContactStage) -> Any:
     found.held = wp.full(count, spring.ANY_DEPTH, dtype=wp.float64)
     found.face = wp.full(count, -1, dtype=wp.int32)
     found.weight = wp.zeros(count, dtype=wp.vec4d)
+    glue(found, stage)
     return found
 
 

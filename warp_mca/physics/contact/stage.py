@@ -14,6 +14,7 @@ from warp_mca.base.joining import offsets
 from warp_mca.kernels.contact import contact, edges, nearest, pair_search, search, sides
 from warp_mca.kernels.contact.laws import Laws
 from warp_mca.kernels.records.columns import PASS, PASS_COLUMNS
+from warp_mca.physics.contact.bonds import bond_lists, list_bonds
 from warp_mca.physics.contact.contact_state import ContactState
 from warp_mca.physics.contact.dashpots import check_dashpots
 from warp_mca.physics.contact.friction_laws import friction_rows
@@ -85,7 +86,7 @@ class ContactStage:
         self.stiffness = wp.array(self._join("stiffness"), dtype=wp.float64)
         self.mu = numbers([item.mu for item in items])
         self.stress_free = any(item.initial_overlap == "stress_free" for item in items)
-        self.laws = Laws(items[0].law, items[0].friction)
+        self.laws = Laws(items[0].law, items[0].friction, any(item.bonds is not None for item in items))
         check_dashpots(items)
         rows = np.repeat([item.parameters for item in items], np.diff(self.springs), axis=0)
         self.parameters = wp.array(rows, dtype=wp.float64, ndim=2)
@@ -182,8 +183,8 @@ class ContactStage:
         """Those of a search."""
         if self.on_plane:
             return []
-        slots, edge = [self.slots] if self.slots else [], [self.edges.find] if self.edges else []
-        return [self.bounds, self.find, self.clear, *slots, *edge]
+        found = [self.bounds, self.find, self.clear, *([self.slots] if self.slots else [])]
+        return found + ([self.edges.find] if self.edges else []) + bond_lists(self)
 
     def begin(self, work: Workspace, state: State) -> None:
         """Note which slaves are clear of the master before the first step, after the first search."""
@@ -223,14 +224,12 @@ class ContactStage:
         if self.slots:
             spaces = [self.slave_scene, self.origin, own.spring]
             wp.launch(self.slots, len(self.slave), inputs=[*inputs, *spaces], outputs=[own.slot])
-        wp.launch(
-            self.find,
-            len(self.slave),
-            inputs=[*inputs, self.side, self.slave_scene, self.origin],
-            outputs=[own.count, own.candidate, own.face_count, own.face_slave, own.u_search, state.flag],
-        )
+        inputs += [self.side, self.slave_scene, self.origin]
+        lists = [own.count, own.candidate, own.face_count, own.face_slave, own.u_search, state.flag]
+        wp.launch(self.find, len(self.slave), inputs=inputs, outputs=lists)
         if self.edges:
             self.edges.list_faces(self, work, state, u)
+        list_bonds(self, own, state)
         wp.launch(search.sort_lists, len(self.face), inputs=[own.face_count], outputs=[own.face_slave])
         wp.launch(search.mark_masters, len(self.master), inputs=[u, self.master], outputs=[own.u_search])
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.geometry.cell_types import is_triangle
+from warp_mca.physics.contact.bonds import BondedNodes
 from warp_mca.physics.contact.friction_laws import friction_values
 from warp_mca.physics.contact.pairs import SLOTS, Pairs
 from warp_mca.physics.contact.sides import find_sides, is_curved, stiffest_fold
@@ -89,6 +90,7 @@ class ContactPass:
         deepest: penetration of a plane that stops the run [m]; faces have half their own size.
         initial_overlap: as in `Contact`.
         pairs: bodies of a general contact, or None.
+        bonds: that glue its slave nodes, or None.
     """
 
     slave: Index = field(metadata=of("nodes"))
@@ -120,6 +122,7 @@ class ContactPass:
     deepest: float = field(default=0.0, metadata=AS_IS)
     initial_overlap: str = field(default="refuse", metadata=AS_IS)
     pairs: Pairs | None = field(default=None, metadata=AS_IS)
+    bonds: BondedNodes | None = field(default=None, metadata=AS_IS)
 
     @property
     def leads(self) -> bool:

@@ -1,0 +1,132 @@
+"""Bonds of a contact: they hold both ways, fail at their strength, and leave an ordinary contact behind."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+from impacts import begun, figures, finished, momentum, prepared, result_of
+
+import warp_mca as mca
+
+STIFF = mca.Elastic(E=2e9, nu=0.0, rho=1000.0)
+SIDE = 0.01
+FINE, COARSE = (2, 4, 4), (2, 2, 2)
+
+
+def halves(
+    bond: mca.Bond,
+    fine: tuple[int, int, int] = FINE,
+    coarse: tuple[int, int, int] = COARSE,
+    *,
+    sets: tuple[str, str] = ("xmax", "xmin"),
+    material: mca.Elastic = STIFF,
+    motion: dict[str, Any] | None = None,
+    duration: float = 1e-4,
+    contact: dict[str, Any] | None = None,
+    **more: Any,
+) -> mca.Scene:
+    """Two blocks along x that meet at x = 0, the finer one glued to the other."""
+    bodies = []
+    for name, x, divisions in (("fine", -SIDE, fine), ("coarse", 0.0, coarse)):
+        mesh = mca.Box(size=(SIDE,) * 3, divisions=divisions, origin=(x, -0.5 * SIDE, -0.5 * SIDE)).build()
+        every = {**mesh.node_sets, "every": np.arange(len(mesh.points), dtype=np.int32)}
+        geometry = dataclasses.replace(mesh, node_sets=every)
+        bodies.append(mca.Body(name=name, geometry=geometry, material=material, **(motion or {})))
+    slave, master = (mca.Surface(body=b.name, nodes=nodes) for b, nodes in zip(bodies, sets, strict=True))
+    axes = {"normal": (-1.0, 0.0, 0.0), "tangent": (0.0, 1.0, 0.0)}
+    return mca.Scene(
+        name="glued",
+        bodies=tuple(bodies),
+        contacts=(mca.Contact(slave=slave, master=master, bond=bond, **axes, **(contact or {})),),
+        impact=mca.ImpactPhase(duration=duration, output_interval=duration / 500.0),
+        **more,
+    )
+
+
+def pulled(bond: mca.Bond, velocity: tuple[float, float], **more: Any) -> mca.Scene:
+    """All nodes of the finer block move with a velocity in x and y [m/s], those of the other stand."""
+
+    def driven(axis: str, speed: float) -> mca.Prescribed:
+        return mca.Prescribed(body="fine", nodes="every", axis=axis, times=(0.0,), velocities=(speed,))
+
+    held = (mca.Fixed(body="coarse", nodes="every"), mca.Fixed(body="fine", nodes="every", axes="z"))
+    drives = tuple(driven(axis, speed) for axis, speed in zip("xy", velocity, strict=True))
+    return halves(bond, fixed=held, prescribed=drives, **more)
+
+
+@pytest.mark.parametrize("sets", [("xmax", "xmin"), ("boundary", "boundary")])
+def test_a_bar_pulled_apart_fails_at_its_strength(sets: tuple[str, str]):
+    """Whole skins hold each other at x = 0 as the two ends do."""
+    ends = mca.Prescribed(body="coarse", nodes="xmax", axis="x", times=(0.0, 5e-5), velocities=(0.0, 1.0))
+    held = (mca.Fixed(body="fine", nodes="xmin"),)
+    scene = halves(mca.Bond(normal=1e6), sets=sets, fixed=held, prescribed=(ends,), duration=1.5e-4)
+    result = mca.run(scene, precision="float64")
+    failed = result.summary["bonds"]["fine–coarse"]
+    assert failed["nodes"] == failed["failed"] == 25
+    assert result.F_n.min() == pytest.approx(-1e6 * SIDE**2, rel=0.02)
+    at = int(result.F_n.argmin())
+    assert result.time[at] <= failed["first_failure"]["time"] <= result.time[at + 1] + 1e-9
+    assert failed["first_failure"]["at"][0] == 0.0
+    stiffness = 0.5 * STIFF.E / 2.0 / (0.5 * SIDE)  # E* / 2 over both layers, for each area [Pa/m]
+    lost = result.summary["energy"]["contact_loss"]
+    assert lost >= 0.99 * 0.5 * 1e12 * SIDE**2 / stiffness and result.F_n[-1] == 0.0
+    assert result.summary["energy_error"] < 1e-6
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.5, 1.0, np.pi / 2])
+def test_tension_and_shear_fail_together(angle: float):
+    """The force k v t of a spring has the angle of the velocity, and fails on the ellipse of both strengths."""
+    normal, shear = 2e6, 1e6
+    velocity = (-np.cos(angle), np.sin(angle))
+    result = mca.run(pulled(mca.Bond(normal=normal, shear=shear), velocity, duration=3e-5), precision="float64")
+    ratio = np.hypot(result.F_n / normal, result.F_t / shear).max() / SIDE**2
+    assert ratio == pytest.approx(1.0, abs=0.02)
+    assert result.summary["bonds"]["fine–coarse"]["failed"] == 25
+    assert result.summary["energy_error"] < 1e-6
+
+
+def test_a_bond_that_shear_broke_goes_on_as_contact_with_friction():
+    """Pressed by k d and then driven along: half of the strength would hold it, and mu F_n is left."""
+    bond = mca.Bond(normal=1e6, shear=1e6)
+    stiffness = 0.5 * STIFF.E / 2.0 / (0.5 * SIDE)  # E* / 2 over both layers, for each area [Pa/m]
+    depth, mu = 0.8e6 / stiffness, 0.3
+    ends = tuple(
+        mca.Prescribed(body="fine", nodes="every", axis=axis, times=times, velocities=speeds)
+        for axis, times, speeds in (
+            ("x", (0.0, 1e-6, 1.1e-6), (depth / 1.05e-6, depth / 1.05e-6, 0.0)),
+            ("y", (2e-6, 2.1e-6), (0.0, 2.0)),
+        )
+    )
+    held = (mca.Fixed(body="coarse", nodes="every"), mca.Fixed(body="fine", nodes="every", axes="z"))
+    scene = halves(bond, duration=2e-5, fixed=held, prescribed=ends, contact={"mu": mu})
+    result = mca.run(scene, precision="float64")
+    broken = result.time > result.summary["bonds"]["fine–coarse"]["last_failure"]["time"] + 1e-6
+    assert 50 < broken.sum() < 450
+    assert result.F_n[result.time > 2e-6] == pytest.approx(0.8e6 * SIDE**2, rel=3e-3)
+    assert np.ptp(result.F_n[result.time > 2e-6]) < 1e-6  # also as it breaks
+    assert np.abs(result.F_t).max() == pytest.approx(1e6 * SIDE**2, rel=0.02)
+    assert np.abs(result.F_t[broken][-20:]) == pytest.approx(mu * 0.8e6 * SIDE**2, rel=3e-3)
+    assert result.summary["energy_error"] < 1e-4
+
+
+def test_glued_blocks_that_turn_keep_momentum_angular_momentum_and_energy():
+    """Bonds stretch by far more than the search for faces looks ahead: reactions must not be lost."""
+    spin, stiff = (40.0, 60.0, 900.0), mca.Elastic(E=1e9, nu=0.3, rho=1000.0)
+    motion = {"angular_velocity": spin, "velocity": (3.0, -2.0, 1.0)}
+    scene = halves(mca.Bond(), material=stiff, motion=motion, duration=2e-3, contact={"penalty": 2e-4})
+    impact = begun(scene, precision="float64")
+    model, before = impact.solver.model, momentum(impact)
+    turning = (model.mass[:, None] * np.cross(model.X, model.V)).sum(axis=0)
+    impact.advance()
+    assert np.linalg.norm(momentum(impact) - before) < 1e-11 * np.linalg.norm(before)
+    u, v = impact.state.u.numpy(), impact.state.v.numpy()
+    place = model.X + u - 0.5 * impact.solver.dt * v  # at the half step
+    after = (model.mass[:, None] * np.cross(place, v)).sum(axis=0)
+    assert np.linalg.norm(after - turning) < 1e-9 * np.linalg.norm(turning)
+    (own,) = (item for item in model.passes if item.bonds is not None)
+    x = (model.X + u)[own.slave] - np.einsum("sk,ski->si", own.bonds.weight, (model.X + u)[own.face[own.bonds.face]])
+    assert np.linalg.norm(x, axis=1).max() > 0.3 * SIDE / 2  # of a face's edge
+    assert impact.scene_runs[0].ledger.kept.energy_error < 1e-4
