@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from impacts import begun, figures, finished, momentum, prepared, result_of
+from impacts import SHORT_RANGES, begun, finished, momentum, prepared, result_of
 
 import warp_mca as mca
+from warp_mca.phases.impact import Impact
+from warp_mca.scene.model_file import load, save
 
 STIFF = mca.Elastic(E=2e9, nu=0.0, rho=1000.0)
 SIDE = 0.01
-FINE, COARSE = (2, 4, 4), (2, 2, 2)
+MU = 0.3  # in all scenes with the same kernels
 
 
 def halves(
     bond: mca.Bond,
-    fine: tuple[int, int, int] = FINE,
-    coarse: tuple[int, int, int] = COARSE,
     *,
     sets: tuple[str, str] = ("xmax", "xmin"),
     material: mca.Elastic = STIFF,
@@ -30,7 +31,7 @@ def halves(
 ) -> mca.Scene:
     """Two blocks along x that meet at x = 0, the finer one glued to the other."""
     bodies = []
-    for name, x, divisions in (("fine", -SIDE, fine), ("coarse", 0.0, coarse)):
+    for name, x, divisions in (("fine", -SIDE, (2, 4, 4)), ("coarse", 0.0, (2, 2, 2))):
         mesh = mca.Box(size=(SIDE,) * 3, divisions=divisions, origin=(x, -0.5 * SIDE, -0.5 * SIDE)).build()
         every = {**mesh.node_sets, "every": np.arange(len(mesh.points), dtype=np.int32)}
         geometry = dataclasses.replace(mesh, node_sets=every)
@@ -57,12 +58,12 @@ def pulled(bond: mca.Bond, velocity: tuple[float, float], **more: Any) -> mca.Sc
     return halves(bond, fixed=held, prescribed=drives, **more)
 
 
-@pytest.mark.parametrize("sets", [("xmax", "xmin"), ("boundary", "boundary")])
-def test_a_bar_pulled_apart_fails_at_its_strength(sets: tuple[str, str]):
+@pytest.mark.parametrize(("sets", "mu"), [(("xmax", "xmin"), MU), (("boundary", "boundary"), 0.0)])
+def test_a_bar_pulled_apart_fails_at_its_strength(sets: tuple[str, str], mu: float):
     """Whole skins hold each other at x = 0 as the two ends do."""
     ends = mca.Prescribed(body="coarse", nodes="xmax", axis="x", times=(0.0, 5e-5), velocities=(0.0, 1.0))
     held = (mca.Fixed(body="fine", nodes="xmin"),)
-    scene = halves(mca.Bond(normal=1e6), sets=sets, fixed=held, prescribed=(ends,), duration=1.5e-4)
+    scene = halves(mca.Bond(normal=1e6), sets=sets, fixed=held, prescribed=(ends,), duration=1.5e-4, contact={"mu": mu})
     result = mca.run(scene, precision="float64")
     failed = result.summary["bonds"]["fine–coarse"]
     assert failed["nodes"] == failed["failed"] == 25
@@ -73,7 +74,7 @@ def test_a_bar_pulled_apart_fails_at_its_strength(sets: tuple[str, str]):
     stiffness = 0.5 * STIFF.E / 2.0 / (0.5 * SIDE)  # E* / 2 over both layers, for each area [Pa/m]
     lost = result.summary["energy"]["contact_loss"]
     assert lost >= 0.99 * 0.5 * 1e12 * SIDE**2 / stiffness and result.F_n[-1] == 0.0
-    assert result.summary["energy_error"] < 1e-6
+    assert result.summary["energy_error"] < 1e-5
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.5, 1.0, np.pi / 2])
@@ -81,7 +82,9 @@ def test_tension_and_shear_fail_together(angle: float):
     """The force k v t of a spring has the angle of the velocity, and fails on the ellipse of both strengths."""
     normal, shear = 2e6, 1e6
     velocity = (-np.cos(angle), np.sin(angle))
-    result = mca.run(pulled(mca.Bond(normal=normal, shear=shear), velocity, duration=3e-5), precision="float64")
+    result = mca.run(
+        pulled(mca.Bond(normal=normal, shear=shear), velocity, duration=3e-5, contact={"mu": MU}), precision="float64"
+    )
     ratio = np.hypot(result.F_n / normal, result.F_t / shear).max() / SIDE**2
     assert ratio == pytest.approx(1.0, abs=0.02)
     assert result.summary["bonds"]["fine–coarse"]["failed"] == 25
@@ -92,7 +95,7 @@ def test_a_bond_that_shear_broke_goes_on_as_contact_with_friction():
     """Pressed by k d and then driven along: half of the strength would hold it, and mu F_n is left."""
     bond = mca.Bond(normal=1e6, shear=1e6)
     stiffness = 0.5 * STIFF.E / 2.0 / (0.5 * SIDE)  # E* / 2 over both layers, for each area [Pa/m]
-    depth, mu = 0.8e6 / stiffness, 0.3
+    depth = 0.8e6 / stiffness
     ends = tuple(
         mca.Prescribed(body="fine", nodes="every", axis=axis, times=times, velocities=speeds)
         for axis, times, speeds in (
@@ -101,22 +104,22 @@ def test_a_bond_that_shear_broke_goes_on_as_contact_with_friction():
         )
     )
     held = (mca.Fixed(body="coarse", nodes="every"), mca.Fixed(body="fine", nodes="every", axes="z"))
-    scene = halves(bond, duration=2e-5, fixed=held, prescribed=ends, contact={"mu": mu})
+    scene = halves(bond, duration=2e-5, fixed=held, prescribed=ends, contact={"mu": MU})
     result = mca.run(scene, precision="float64")
     broken = result.time > result.summary["bonds"]["fine–coarse"]["last_failure"]["time"] + 1e-6
     assert 50 < broken.sum() < 450
     assert result.F_n[result.time > 2e-6] == pytest.approx(0.8e6 * SIDE**2, rel=3e-3)
     assert np.ptp(result.F_n[result.time > 2e-6]) < 1e-6  # also as it breaks
     assert np.abs(result.F_t).max() == pytest.approx(1e6 * SIDE**2, rel=0.02)
-    assert np.abs(result.F_t[broken][-20:]) == pytest.approx(mu * 0.8e6 * SIDE**2, rel=3e-3)
+    assert np.abs(result.F_t[broken][-20:]) == pytest.approx(MU * 0.8e6 * SIDE**2, rel=3e-3)
     assert result.summary["energy_error"] < 1e-4
 
 
 def test_glued_blocks_that_turn_keep_momentum_angular_momentum_and_energy():
     """Bonds stretch by far more than the search for faces looks ahead: reactions must not be lost."""
     spin, stiff = (40.0, 60.0, 900.0), mca.Elastic(E=1e9, nu=0.3, rho=1000.0)
-    motion = {"angular_velocity": spin, "velocity": (3.0, -2.0, 1.0)}
-    scene = halves(mca.Bond(), material=stiff, motion=motion, duration=2e-3, contact={"penalty": 2e-4})
+    motion = {"kinematics": "finite", "angular_velocity": spin, "velocity": (3.0, -2.0, 1.0)}
+    scene = halves(mca.Bond(), material=stiff, motion=motion, duration=2e-3, contact={"penalty": 3e-5, "mu": MU})
     impact = begun(scene, precision="float64")
     model, before = impact.solver.model, momentum(impact)
     turning = (model.mass[:, None] * np.cross(model.X, model.V)).sum(axis=0)
@@ -125,8 +128,92 @@ def test_glued_blocks_that_turn_keep_momentum_angular_momentum_and_energy():
     u, v = impact.state.u.numpy(), impact.state.v.numpy()
     place = model.X + u - 0.5 * impact.solver.dt * v  # at the half step
     after = (model.mass[:, None] * np.cross(place, v)).sum(axis=0)
-    assert np.linalg.norm(after - turning) < 1e-9 * np.linalg.norm(turning)
+    assert np.linalg.norm(after - turning) < 1e-13 * np.linalg.norm(turning)
     (own,) = (item for item in model.passes if item.bonds is not None)
     x = (model.X + u)[own.slave] - np.einsum("sk,ski->si", own.bonds.weight, (model.X + u)[own.face[own.bonds.face]])
     assert np.linalg.norm(x, axis=1).max() > 0.3 * SIDE / 2  # of a face's edge
     assert impact.scene_runs[0].ledger.kept.energy_error < 1e-4
+
+
+BREAKING = pulled(mca.Bond(normal=2e6, shear=1e6), (-1.0, 0.5), duration=3e-5, contact={"mu": MU})
+
+
+def test_a_breaking_bond_repeats_in_a_batch_on_threads_and_from_a_state(monkeypatch, tmp_path: Path):
+    """Beside a scene without a bond, too."""
+    alone = finished(BREAKING)
+    plain = dataclasses.replace(BREAKING.contacts[0], bond=None)
+    both = begun(BREAKING, dataclasses.replace(BREAKING, contacts=(plain,)), BREAKING)
+    both.advance()
+    for k in (0, 2):
+        assert all(
+            np.array_equal(a, b, equal_nan=True) for a, b in zip(figures_of(alone, 0), figures_of(both, k), strict=True)
+        )
+    assert "bonds" not in result_of(both, 1).summary and result_of(both, 1).F_n.min() == 0.0
+    assert result_of(both, 2).summary["bonds"] == result_of(alone).summary["bonds"]
+    for name, length in SHORT_RANGES.items():
+        monkeypatch.setattr(name, length)
+    threaded = begun(BREAKING, threads=2)
+    threaded.advance(until=alone.state.steps // 2)
+    threaded.save(tmp_path / "half.state")
+    again = begun(BREAKING, threads=2)
+    again.load(tmp_path / "half.state")
+    again.advance()
+    assert alone.state.differences(again.state) == []
+    assert result_of(again).summary["bonds"] == result_of(alone).summary["bonds"]
+
+
+def figures_of(impact: Impact, index: int) -> list[np.ndarray]:
+    found = result_of(impact, index)
+    return [*found.history.values(), *(contact.force for contact in found.contacts)]
+
+
+def test_bonds_of_several_rates_fail_at_their_strength():
+    scene = dataclasses.replace(BREAKING, prescribed=(), fixed=(BREAKING.fixed[0],))
+    ends = mca.Prescribed(body="fine", nodes="xmin", axis="x", times=(0.0, 5e-5), velocities=(0.0, -1.0))
+    grown = mca.Box(size=(SIDE,) * 3, divisions=(8, 4, 4), origin=(-SIDE, -0.5 * SIDE, -0.5 * SIDE))
+    bodies = (dataclasses.replace(scene.bodies[0], geometry=grown), scene.bodies[1])
+    impact = mca.ImpactPhase(duration=1e-4, output_interval=2e-7)
+    result = mca.run(dataclasses.replace(scene, bodies=bodies, prescribed=(ends,), impact=impact), multi_rate=2)
+    assert result.summary["bonds"]["fine–coarse"]["failed"] == 25
+    assert result.F_n.min() == pytest.approx(-2e6 * SIDE**2, rel=0.02)
+
+
+def test_a_model_file_keeps_bonds(tmp_path: Path):
+    ready = prepared(BREAKING)
+    save(tmp_path / "bond.mca", BREAKING, ready.meshes)
+    assert load(tmp_path / "bond.mca").scene.contacts == BREAKING.contacts
+
+
+def test_nodes_off_the_faces_are_moved_onto_them_or_left_free():
+    """Of a slave that reaches 2 mm beyond the master, the middle rows are glued; 0.1 mm of gap is closed."""
+    box = mca.Box(size=(SIDE, 1.4 * SIDE, SIDE), divisions=(1, 7, 4), origin=(-SIDE - 1e-4, -0.7 * SIDE, -0.5 * SIDE))
+    scene = halves(mca.Bond())
+    ready = prepared(
+        dataclasses.replace(scene, bodies=(dataclasses.replace(scene.bodies[0], geometry=box), scene.bodies[1]))
+    )
+    item = next(item for item in ready.model.passes if item.bonds is not None)
+    y, glued = ready.model.X[item.slave, 1], item.bonds.face >= 0
+    assert (glued == (np.abs(y) < 0.0051)).all() and glued.sum() == 30
+    assert ready.model.X[item.slave[glued], 0] == pytest.approx(0.0, abs=1e-18)
+    assert ready.model.X[item.slave[~glued], 0] == pytest.approx(-1e-4)
+
+
+@pytest.mark.parametrize(
+    ("change", "what"),
+    [
+        ({"master": mca.RigidPlane()}, r"Contact\.bond = .*: a rigid plane has no faces to glue to"),
+        ({"two_way": True}, r"Contact\.bond = .*: the slave's nodes alone are glued"),
+        ({"bond": 1.0}, r"Contact\.bond = 1\.0: give a Bond or None"),
+    ],
+)
+def test_contacts_that_cannot_have_a_bond_are_refused(change: dict[str, Any], what: str):
+    with pytest.raises(mca.RequestError, match=what):
+        dataclasses.replace(BREAKING.contacts[0], **change)
+
+
+def test_bonds_that_would_hold_nothing_or_places_that_move_are_refused():
+    apart = dataclasses.replace(BREAKING.bodies[0], position=(-1e-3, 0.0, 0.0))
+    with pytest.raises(mca.RequestError, match=r"^Contact fine–coarse: Bond\.gap = 0\.05: no slave node lies on"):
+        prepared(dataclasses.replace(BREAKING, bodies=(apart, BREAKING.bodies[1])))
+    with pytest.raises(mca.RequestError, match=r"Bond\.normal = 0"):
+        mca.Bond(normal=0.0)
