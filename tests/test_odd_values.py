@@ -49,6 +49,7 @@ SOUND: dict[type, Any] = {
     mca.Contact: mca.Contact(slave=mca.Surface(body="up", nodes="ymin"), master=TOP, mu=0.3, penalty=1.0),
     mca.Penalty: mca.Penalty(),
     mca.DampedPenalty: mca.DampedPenalty(time=1e-6, speed=0.1),
+    mca.Bond: mca.Bond(normal=1e6, shear=1e6, gap=0.5),
     mca.DecayingFriction: mca.DecayingFriction(kinetic=0.2, decay=2.0),
     mca.ShearCap: mca.ShearCap(tau_max=1e8),
     mca.Revolute: mca.Revolute(name="O", body="up", at=(0.0, 0.0, 0.0)),
@@ -166,6 +167,8 @@ def scene_with(item: Any) -> mca.Scene:
             change = {"joints": (item,)}
         case mca.Penalty() | mca.DampedPenalty():
             change = {"contacts": (dataclasses.replace(SOUND[mca.Contact], law=item),)}
+        case mca.Bond():
+            change = {"contacts": (dataclasses.replace(SOUND[mca.Contact], bond=item),)}
         case mca.DecayingFriction() | mca.ShearCap():
             change = {"contacts": (dataclasses.replace(SOUND[mca.Contact], friction=item),)}
         case mca.Surface() | mca.RigidPlane():

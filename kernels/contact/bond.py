@@ -12,6 +12,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.balance import energy_made
+from warp_mca.kernels.contact.edges import Surfaces, greatest_stiffness
 from warp_mca.kernels.contact.nearest import Master, master_velocity
 from warp_mca.kernels.contact.projection import area_vector, interpolate
 from warp_mca.kernels.contact.search import list_slave
@@ -103,16 +104,34 @@ def hold(
 
 
 @wp.func
-def bonded_spring(begin: int, end: int, spring: Spring) -> int:
-    """Which of a node's springs, from `begin` to `end` - 1, a bond holds, or -1; the others are clear of all faces."""
-    found = int(-1)
+def hold_node(
+    at: Surfaces,
+    s: int,
+    scene: int,
+    begin: int,
+    end: int,
+    v: wp.array(dtype=wp.vec3d),
+    per_newton: wp.float64,
+    dt: wp.float64,
+    spring: Spring,
+    normal_force_out: wp.array(dtype=wp.int64),
+):
+    """The bond among springs `begin` to `end` - 1 of slave node s, which is clear of the other sides then.
+
+    Returns the first spring that is left to press the node, `end` where a bond holds it, and the force on it [N].
+    """
+    force = wp.vec3d()
+    bonded = int(-1)
     for e in range(begin, end):
         if spring.bond[e] == wp.static(HOLDS):
-            found = e
-    if found >= 0:
+            bonded = e
+    if bonded >= 0:
         for e in range(begin, end):
             spring.held[e] = wp.float64(0.0)
-    return found
+        own = greatest_stiffness(at, s, spring.face[bonded])
+        i = at.slaves.node[s]
+        force = hold(bonded, i, scene, at.X, at.u, v, at.master, own, per_newton, dt, spring, normal_force_out)
+    return wp.where(bonded >= 0, end, begin), force
 
 
 @cache

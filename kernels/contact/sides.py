@@ -9,7 +9,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.contact.bond import bonded_spring, hold
+from warp_mca.kernels.contact.bond import hold_node
 from warp_mca.kernels.contact.contact import BLOCK_DIM
 from warp_mca.kernels.contact.edge_rest import release_function
 from warp_mca.kernels.contact.edges import Surfaces, greatest_stiffness
@@ -67,14 +67,11 @@ def sided_kernel(friction: bool, each: bool, sides: int, laws: Laws = PLAIN, slo
         s = first + wp.tid()
         i, k = at.slaves.node[s], of(scene, s)
         x = at.X[i] + at.u[i]
-        total, scale = wp.vec3d(), of(per_newton, k)
-        active = bool(False)
+        total, scale, active = wp.vec3d(), of(per_newton, k), bool(False)
         start, end = wp.static(sides * slots) * s, wp.static(sides * slots) * (s + 1)
         if wp.static(laws.bond):
-            bonded = bonded_spring(start, end, spring)
-            if bonded >= 0:
-                own, active, start = greatest_stiffness(at, s, spring.face[bonded]), bool(True), end
-                total = hold(bonded, i, k, at.X, at.u, v, at.master, own, scale, dt, spring, normal_force_out)
+            start, total = hold_node(at, s, k, start, end, v, scale, dt, spring, normal_force_out)
+            active = start == end
         for begin in range(start, end, wp.static(sides)):
             node = springs_of_node(begin, at.master.count, spring)
             along = wp.vec3f(node.pressed)
