@@ -213,7 +213,7 @@ def test_without_friction_nothing_tangential_is_left():
     assert np.abs(result.F_t).max() == 0.0
     assert result["E_friction"].max() == 0.0
     assert result["tip_vx"] == pytest.approx(1.0, rel=1e-6)  # rounding of float32 forces
-    assert stage.kernel is contact.plane_kernel(False, False, stage.stress_free)
+    assert stage.kernel is contact.plane_kernel(False, False, stage.overlaps != {"refuse"})
 
 
 def test_springs_are_empty_after_a_bounce():
@@ -257,12 +257,11 @@ def test_closed_surface_pushes_as_the_face_that_is_touched(gap):
 
 def test_bodies_that_overlap_from_the_start_are_pushed_apart():
     """So are those that begin deeper than any slack; later, nobody can be there."""
-    scene = bars("boundary", gap=-5e-4, ratio=3, initial_overlap="press")
-    scene = mca.Scene(**{**vars(scene), "impact": mca.ImpactPhase(duration=2e-5, energy_tolerance=10.0)})
-    result = mca.run(scene)
-    assert result.summary["max_penetration"] == pytest.approx(5e-4, rel=0.2)
-    assert result["E_contact"][0] > 10.0 * result["E_contact"][-1]
-    assert result["E_kinetic"][-1] > 2.0 * result["E_kinetic"][0]
+    impact = finished(bars("boundary", gap=-5e-4, ratio=3, initial_overlap="press"), duration=3e-4)
+    x = (impact.solver.model.X + impact.state.u.numpy())[:, 0]
+    thin = x[: impact.solver.model.node_start["thick"]]
+    assert thin.max() - x[len(thin) :].min() < 1e-5  # of 0.5 mm
+    assert impact.scene_runs[0].ledger.kept.energy_error < 5e-3
 
 
 def test_node_that_slides_through_a_fold_deep_down_stays_in_contact():

@@ -107,11 +107,56 @@ def test_stress_free_nodes_that_left_come_back_to_the_surface():
     assert first == pytest.approx((1.0 + np.sqrt(1.0 - 2.0 * 1e5 * 2e-6)) / 1e5, abs=3e-7)  # y = v t - g t^2 / 2
 
 
-def test_pressed_overlap_throws_the_bodies_apart():
-    scene = falling(1e-6, plane=True, initial_overlap="press", penalty=1.0)
+@pytest.mark.parametrize("penalty", [None, 5.0])
+def test_a_block_is_pressed_between_walls(penalty: float | None):
+    """A bar of stiffness E A / L in series with the springs; at once, springs of penalty = 5 made 9 % of the energy."""
+    scene = falling(1e-5, plane=True, initial_overlap="press", penalty=penalty, speed=0.0)
+    scene = replace(scene, fixed=(mca.Fixed(body="block", nodes="ymax", axes="y"),))
+    result = mca.run(replace(scene, impact=mca.ImpactPhase(duration=8e-5, output_interval=1e-7)))
+    area, cell = 1e-4, 0.01 / 4.0
+    springs = STEEL.E / (1.0 - STEEL.nu**2) / 2.0 * area / cell  # E* A / 2 d
+    if penalty:
+        springs = 25.0 * penalty * STEEL.bulk_modulus * cell  # 25 nodes of f K A^2 / V
+    force = 1e-5 / (0.01 / (STEEL.E * area) + 1.0 / springs)
+    assert result.F_n[result.time > 4e-5].mean() == pytest.approx(force, rel=0.02)
+    assert result.F_n.max() < 1.1 * force
+    assert result.summary["energy_error"] < 2e-3
+    assert result.summary["energy"]["external_work"] == pytest.approx(0.5 * force * 1e-5, rel=0.05)
+
+
+def quarter(inner: float, outer: float, layers: int) -> mca.Mesh:
+    """A quarter of a tube around z, 2 mm long, with node sets `in`, `out`, and `x0`, `y0` on its planes of symmetry."""
+    angles, length = np.linspace(0.0, 0.5 * np.pi, 13), 2e-3
+    radii = np.linspace(inner, outer, layers + 1)
+    at = [(r * np.cos(a), r * np.sin(a), z) for z in (0.0, length) for r in radii for a in angles]
+    number = np.arange(len(at)).reshape(2, layers + 1, 13)
+    around = [number[:, :-1, :-1], number[:, 1:, :-1], number[:, 1:, 1:], number[:, :-1, 1:]]
+    cells = np.stack([corner[z] for z in (0, 1) for corner in around], axis=-1).reshape(-1, 8)
+    sets = {"in": number[:, 0], "out": number[:, -1], "y0": number[:, :, 0], "x0": number[:, :, -1]}
+    node_sets = {name: nodes.ravel().astype(np.int32) for name, nodes in sets.items()}
+    return mca.Mesh(points=np.array(at), hexahedra=cells.astype(np.int32), node_sets=node_sets)
+
+
+def test_a_ring_pressed_on_a_hollow_shaft_has_the_pressure_of_lame():
+    """delta = p b / E ((c^2 + b^2) / (c^2 - b^2) + (b^2 + a^2) / (b^2 - a^2)) of the interference delta in the radius:
+    Timoshenko and Goodier, Theory of Elasticity, 28."""
+    a, b, c, delta = 5e-3, 10e-3, 20e-3, 1e-5
+    meshes = {"shaft": quarter(a, b + 0.5 * delta, 4), "ring": quarter(b - 0.5 * delta, c, 8)}
+    planes = [mca.Fixed(body=name, nodes=f"{axis}0", axes=axis) for name in meshes for axis in "xy"]
+    sides = [mca.Surface(body="shaft", nodes="out"), mca.Surface(body="ring", nodes="in")]
+    scene = mca.Scene(
+        name="press fit",
+        bodies=tuple(mca.Body(name=name, geometry=mesh, material=STEEL) for name, mesh in meshes.items()),
+        contacts=(mca.Contact(slave=sides[0], master=sides[1], initial_overlap="press"),),
+        fixed=tuple(planes),
+        impact=mca.ImpactPhase(duration=8e-5, output_interval=2e-7),
+    )
     result = mca.run(scene)
-    springs = 16 * STEEL.bulk_modulus * 0.01 / 4.0  # K A^2 / V: 25 nodes, of cells with edges of 10 mm / 4
-    assert result["E_contact"][0] == pytest.approx(0.5 * 25 / 16 * springs * 1e-12, rel=0.02)
+    compliance = (c**2 + b**2) / (c**2 - b**2) + (b**2 + a**2) / (b**2 - a**2)
+    pressure = result.contacts[0].pressure / (0.5 * np.pi * b * 2e-3) / (STEEL.E * delta / (b * compliance))
+    assert pressure[result.time > 4e-5].mean() == pytest.approx(1.0, abs=0.01)
+    assert pressure.max() < 1.1
+    assert result.summary["energy_error"] < 2e-3
 
 
 def test_a_body_at_rest_above_a_plane_has_nothing_said_of_overlap():

@@ -165,11 +165,11 @@ react_kernel(False, 1)  # this variant belongs to the module, so it must exist b
 
 
 @cache
-def plane_kernel(friction: bool, each: bool, stress_free: bool = False, laws: Laws = PLAIN) -> Any:
+def plane_kernel(friction: bool, each: bool, may_overlap: bool = False, laws: Laws = PLAIN) -> Any:
     """Kernel: contact of slave nodes with an analytic plane that may move along itself; as for surfaces."""
     press = spring_function(friction, laws)
     open_contact = open_function(friction, laws)
-    gap_from_rest = rest_function(stress_free)
+    gap_from_rest = rest_function(may_overlap)
     of, Real, Vector, Index = value_function(each), kind(wp.float64, each), kind(wp.vec3d, each), kind(wp.int32, each)
 
     @wp.kernel(enable_backward=False, module="unique")

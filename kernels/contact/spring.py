@@ -19,26 +19,26 @@ ANY_DEPTH = FAR  # depth before the first step: bodies may overlap from the star
 class Spring:
     """State of every slave node's springs; arrays have shape (spring_count,), those of slave 0 first.
 
-    tangential: friction force on the slave [N]. force: total force on it [N]. face: touched face or -1 [-].
-    weight: shape functions of the touched point [-]. energy: elastic energy held [J]. friction: energy dissipated
-    so far [J]. drive: work done by a moving plane so far [J]. impulse, normal_impulse, stick_impulse: force, normal
-    force and normal force while sticking, summed over the steps since the last row of the history [N]. depth: largest
-    penetration so far [m]. held: depth in the touched face, or in the last one for a node that slid off its side; 0
-    in front of all faces, ANY_DEPTH before the first step unless clear of them [m]; planes leave it alone.
+    tangential: friction force on the slave [N]. force: total force on it [N]. face: touched face or -1 [-]. weight:
+    shape functions of the touched point [-]. energy: elastic energy held [J]. friction: energy dissipated so far [J].
+    drive: work done by a moving plane, or by pressing bodies apart, so far [J]. impulse, normal_impulse, stick_impulse:
+    force, normal force and normal force while sticking, summed over the steps since the last row of the history [N].
+    depth: largest penetration so far [m]. held: depth in the touched face, or in the last one for a node that slid off
+    its side; 0 in front of all faces, ANY_DEPTH before the first step unless clear of them [m]; planes leave it alone.
     stiffness: of the spring while it is pressed on a face [N/m]; planes leave it alone. lost: energy that it lost as it
-    became softer [J]. rest: depth at which it is free of force [m], only where bodies that overlap start stress-free,
-    and of masters with several sides. normal_energy: the part of `energy` that the normal spring holds [J].
-    parameters: of the contact law [SI units], shape (spring_count, parameter_count). made: energy that it made so far,
-    see `balance.energy_made` [J]. left: compression
-    with which the side pressed the node last, until it is in front of that side, below it without being pressed, or
-    pressed by another [m]. support, share: the slave's edge that the spring presses in place of its node, or -1, and
-    the node's share of the force [-]; see `edge_rest`. bears: 1 where the side was the last to press the node itself,
-    else 0 [-]. These four are only of masters with several sides. dashpot: force of the law's dashpot in the last step
-    [N], and energy that it dissipated so far [J]; only of laws that have one. limit: of the friction force in the last
-    step [N], and friction_parameters: of the laws of friction [SI units], shape (law_count spring_count,
-    parameter_count), those of spring 0 first; only of contacts with such laws. bond: 1 while a bond holds the node to
-    its place on `face`, -1 once it has failed, else 0; bond_time: that it has held [s]; bond_limit: forces in tension
-    and in shear at which it fails [N]; only of contacts with bonds.
+    became softer [J]. rest: depth at which it is free of force [m], only of surfaces, and of planes that bodies may
+    overlap at the start. pressed: see `shrink` [m], and by how much it did so in the last step [m], only where bodies
+    that overlap are pressed apart. normal_energy: the part of `energy` that the normal spring holds [J]. parameters: of
+    the contact law [SI units], shape (spring_count, parameter_count). made: energy that it made so far, see
+    `balance.energy_made` [J]. left: compression with which the side pressed the node last, until it is in front of that
+    side, below it without being pressed, or pressed by another [m]. support, share: the slave's edge that the spring
+    presses in place of its node, or -1, and the node's share of the force [-]; see `edge_rest`. bears: 1 where the side
+    was the last to press the node itself, else 0 [-]. These four are only of masters with several sides. dashpot: force
+    of the law's dashpot in the last step [N], and energy that it dissipated so far [J]; only of laws that have one.
+    limit: of the friction force in the last step [N], and friction_parameters: of the laws of friction [SI units],
+    shape (law_count spring_count, parameter_count), those of spring 0 first; only of contacts with such laws. bond: 1
+    while a bond holds the node to its place on `face`, -1 once it has failed, else 0; bond_time: that it has held [s];
+    bond_limit: forces in tension and in shear at which it fails [N]; only of contacts with bonds.
     """
 
     tangential: wp.array(dtype=wp.vec3d)
@@ -66,6 +66,7 @@ class Spring:
     dashpot: wp.array(dtype=wp.vec2d)
     limit: wp.array(dtype=wp.float64)
     friction_parameters: wp.array2d(dtype=wp.float64)
+    pressed: wp.array(dtype=wp.vec2d)
     bond: wp.array(dtype=wp.int32)
     bond_time: wp.array(dtype=wp.float64)
     bond_limit: wp.array(dtype=wp.vec2d)
@@ -85,17 +86,40 @@ def pressure_function(friction: bool) -> Any:
     return pressure
 
 
+@wp.func
+def shrink(s: int, spring: Spring) -> wp.float64:
+    """By how much the overlap of bodies that are pressed apart shrinks in this step [m].
+
+    In steps of a, 2 a, ..., h a, h a, ..., 2 a, a, so smoothly that few springs open; j (j + 1) / 2 a are left for the
+    last j.
+    """
+    rest = spring.rest[s]
+    a = spring.pressed[s][0]
+    one = wp.float64(1.0)
+    left = wp.float64(0.5) * (wp.sqrt(one + wp.float64(8.0) * rest / a) - one)
+    given = wp.min(wp.min(spring.pressed[s][1] + a, a * wp.max(left, one)), rest)
+    spring.pressed[s] = wp.vec2d(wp.where(given < rest, a, wp.float64(0.0)), given)
+    return given
+
+
 @cache
-def rest_function(stress_free: bool) -> Any:
+def rest_function(may_overlap: bool) -> Any:
     """The function that measures a gap from the depth at which a spring is free: 0, or the overlap at the start.
 
-    That overlap shrinks as the node moves outwards, and does not grow again.
+    That overlap shrinks as the node moves outwards, and does not grow again. Where bodies are pressed apart it shrinks
+    by itself, too.
     """
 
     @wp.func
     def gap_from_rest(s: int, gap: wp.float64, spring: Spring):
-        if wp.static(stress_free):
+        if wp.static(may_overlap):
             rest = wp.min(spring.rest[s], wp.max(-gap, wp.float64(0.0)))
+            if spring.pressed.shape[0] > 0:
+                if spring.pressed[s][0] > wp.float64(0.0):
+                    rest = spring.rest[s] - shrink(s, spring)
+                    gap = wp.min(gap, -rest)  # a node that moves out faster has no force, and the overlap shrinks on
+                else:
+                    spring.pressed[s] = wp.vec2d()
             spring.rest[s] = rest
             gap += rest
         return gap
@@ -179,6 +203,10 @@ def spring_function(friction: bool, laws: Laws) -> Any:
             if stick == 1 and mu > wp.float64(0.0):  # a scene of a batch may have no friction
                 spring.stick_impulse[s] = stick_impulse + Fn
         made = energy_made(s, force, energy, spent, du, spring)
+        if spring.pressed.shape[0] > 0:  # work that brings the overlap in, of the forces at both ends of the step
+            given = half * (wp.length(pressure(s, spring)) + Fn) * spring.pressed[s][1]
+            made -= given
+            spring.drive[s] = spring.drive[s] + given
         if wp.static(friction):
             spring.tangential[s] = Ft
         spring.made[s] = made_before + made

@@ -53,7 +53,7 @@ class ContactStage:
         self._begin(items, model, index, normal_force)
         friction = any(item.mu > 0.0 for item in items)
         if items[0].plane is not None:
-            self.kernel = contact.plane_kernel(friction, self.each, self.stress_free, self.laws)
+            self.kernel = contact.plane_kernel(friction, self.each, self.overlaps != {"refuse"}, self.laws)
             self._make_planes()
             return
         slots = SLOTS if self.general and self.sides > 1 else 1
@@ -85,7 +85,7 @@ class ContactStage:
         self.slave = wp.array(self._join("slave"), dtype=wp.int32)
         self.stiffness = wp.array(self._join("stiffness"), dtype=wp.float64)
         self.mu = numbers([item.mu for item in items])
-        self.stress_free = any(item.initial_overlap == "stress_free" for item in items)
+        self.overlaps = {item.initial_overlap for item in items}
         self.laws = Laws(items[0].law, items[0].friction, any(item.bonds is not None for item in items))
         check_dashpots(items)
         rows = np.repeat([item.parameters for item in items], np.diff(self.springs), axis=0)
@@ -288,9 +288,11 @@ class ContactStage:
         found.master, found.pairs = self.faces_of(own), self.pairs_of(own)
         return found
 
-    def rest_at(self, state: State, depth: NDArray[np.float64]) -> None:
-        """Let springs be free of force at these depths [m], shape (spring_count,)."""
-        state.contacts[self.index].spring.rest.assign(depth)
+    def rest_at(self, state: State, depth: NDArray[np.float64], rate: NDArray[np.float64]) -> None:
+        """Let springs be free of force at these depths, which shrink at a rate [m], both of shape (spring_count,)."""
+        spring = state.contacts[self.index].spring
+        spring.rest.assign(depth)
+        spring.pressed.assign(np.column_stack([rate, 0.0 * rate])[: len(spring.pressed)])
 
     def depths(self, state: State, scene: int) -> NDArray[np.float64]:
         """Largest penetration so far of each spring of a scene [m], those of slave 0 first, shape (spring_count,)."""
