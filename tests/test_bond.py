@@ -71,10 +71,10 @@ def test_a_bar_pulled_apart_fails_at_its_strength(sets: tuple[str, str], mu: flo
     at = int(result.F_n.argmin())
     assert result.time[at] <= failed["first_failure"]["time"] <= result.time[at + 1] + 1e-9
     assert failed["first_failure"]["at"][0] == 0.0
-    stiffness = 0.5 * STIFF.E / 2.0 / (0.5 * SIDE)  # E* / 2 over both layers, for each area [Pa/m]
+    stiffness = 2.0 * STIFF.E / 2.0 / (0.5 * SIDE)  # 2 E* over both layers, for each area [Pa/m]
     lost = result.summary["energy"]["contact_loss"]
     assert lost >= 0.99 * 0.5 * 1e12 * SIDE**2 / stiffness and result.F_n[-1] == 0.0
-    assert result.summary["energy_error"] < 1e-5
+    assert result.summary["energy_error"] < 1e-4
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.5, 1.0, np.pi / 2])
@@ -94,7 +94,7 @@ def test_tension_and_shear_fail_together(angle: float):
 def test_a_bond_that_shear_broke_goes_on_as_contact_with_friction():
     """Pressed by k d and then driven along: half of the strength would hold it, and mu F_n is left."""
     bond = mca.Bond(normal=1e6, shear=1e6)
-    stiffness = 0.5 * STIFF.E / 2.0 / (0.5 * SIDE)  # E* / 2 over both layers, for each area [Pa/m]
+    stiffness = 2.0 * STIFF.E / 2.0 / (0.5 * SIDE)  # 2 E* over both layers, for each area [Pa/m]
     depth = 0.8e6 / stiffness
     ends = tuple(
         mca.Prescribed(body="fine", nodes="every", axis=axis, times=times, velocities=speeds)

@@ -46,7 +46,7 @@ def offset(
 
 
 @wp.func
-def hold(
+def hold_bond(
     e: int,
     i: int,
     scene: int,
@@ -130,7 +130,7 @@ def hold_node(
             spring.held[e] = wp.float64(0.0)
         own = greatest_stiffness(at, s, spring.face[bonded])
         i = at.slaves.node[s]
-        force = hold(bonded, i, scene, at.X, at.u, v, at.master, own, per_newton, dt, spring, normal_force_out)
+        force = hold_bond(bonded, i, scene, at.X, at.u, v, at.master, own, per_newton, dt, spring, normal_force_out)
     return wp.where(bonded >= 0, end, begin), force
 
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.contact.bond import HOLDS, hold
+from warp_mca.kernels.contact.bond import HOLDS, hold_bond
 from warp_mca.kernels.contact.laws import PLAIN, Laws
 from warp_mca.kernels.contact.nearest import Master, nearest_face
 from warp_mca.kernels.contact.pairs import Pairs, pair_factor
@@ -75,7 +75,9 @@ def surface_kernel(friction: bool, each: bool, laws: Laws = PLAIN, noted: bool =
         if wp.static(laws.bond):
             bonded = spring.bond[s] == wp.static(HOLDS)
             if bonded:
-                force = hold(s, i, k, X, u, v, master, stiffness[s], of(per_newton, k), dt, spring, normal_force_out)
+                force = hold_bond(
+                    s, i, k, X, u, v, master, stiffness[s], of(per_newton, k), dt, spring, normal_force_out
+                )
                 nodal_force_out[i] = nodal_force_out[i] + force
                 if wp.static(noted):
                     recent_out[i] = recent(recent_out[i], force)

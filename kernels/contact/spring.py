@@ -37,8 +37,9 @@ class Spring:
     of the law's dashpot in the last step [N], and energy that it dissipated so far [J]; only of laws that have one.
     limit: of the friction force in the last step [N], and friction_parameters: of the laws of friction [SI units],
     shape (law_count spring_count, parameter_count), those of spring 0 first; only of contacts with such laws. bond: 1
-    while a bond holds the node to its place on `face`, -1 once it has failed, else 0; bond_time: that it has held [s];
-    bond_limit: forces in tension and in shear at which it fails [N]; only of contacts with bonds.
+    while a bond holds the node to its place on `face`, -1 once it has failed, else 0 [-]. bond_time: how long it has
+    held [s]. bond_limit: forces in tension and in shear at which it fails [N]. These three are only of contacts with
+    bonds.
     """
 
     tangential: wp.array(dtype=wp.vec3d)

@@ -18,7 +18,8 @@ class Bond:
 
     with the area A of the slave's faces around the node (LS-DYNA keyword manual, tiebreak contact). From then on the
     node is in contact as others are, with friction. The summary lists nodes, how many failed, and where and when the
-    first did. Let the finer mesh be the slave: nodes of the master are glued to nothing.
+    first did. Let the finer mesh be the slave: nodes of the master are glued to nothing. Where its faces lie within
+    those of the master a uniform stress breaks all at once; of 4 cells on 3 the first break 6 % early.
 
     Attributes:
         normal: strength in tension [Pa]; None for a bond that tension never breaks.

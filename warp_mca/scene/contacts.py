@@ -117,7 +117,8 @@ class Contact(_Springs):
         two_way: whether the master's nodes are also kept out of the slave's faces. None does so where the slave's faces
             are more than 1.5 times as wide as the master's.
         initial_overlap: what to do where bodies overlap before the first step: "refuse" the scene; start "stress_free",
-            with springs that count depth from there; or "press", with the springs' full force.
+            with springs that count depth from there; or "press" them apart, as a press fit: springs come to their full
+            force while waves cross the longer body six times. They begin with it where that bears no more than weight.
         name: unique in the scene; None for the bodies' names, "slave–master" or "slave–plane", numbered where a pair
             has several contacts. Results list forces by it.
         normal: direction of the force on the slave that F_n_N reports [-], of any length. None takes the master's mean

@@ -89,7 +89,7 @@ def undented_master(c: Finished, least: float) -> Iterator[Values]:
     for k, item, contact in listed_passes(c.scene, c.model):
         if isinstance(contact.master, RigidPlane) or not item.leads or contact.master.body in c.scene.rigid_names:
             continue
-        if _few_nodes(c, k, PATCH):  # they do not tell how wide the pressed place is
+        if item.bonds is not None or _few_nodes(c, k, PATCH):  # they do not tell how wide the pressed place is
             continue
         patch, width = _pressed(c.model, item, c.ledger.nodes_at_peak(k), c.depths[k])
         if patch < least * width**2:
@@ -99,6 +99,8 @@ def undented_master(c: Finished, least: float) -> Iterator[Values]:
 def _few_nodes(c: Finished, k: int, patch: float) -> float:
     """Nodes that carried contact pass k at its greatest force, if these are few; else 0."""
     item = c.model.passes[k]
+    if item.bonds is not None:
+        return 0.0
     planes = sum(share > 0.0 for share in _held(c.model, item))
     # A plane of symmetry leaves half of the patch, and half of the force on nodes in it.
     count = c.ledger.nodes_at_peak(k) * math.sqrt(2.0) ** planes

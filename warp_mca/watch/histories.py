@@ -24,7 +24,8 @@ ALONG = 0.99  # cosine from which on an axis is taken as that of a plane of symm
 @row("no contact closed in the simulated time:", "give a longer duration, or check positions and speeds")
 def no_contact(c: Finished, _: float) -> Iterator[Values]:
     """Whether any contact of a scene with contacts was touched."""
-    if c.contacts and not any(contact.touched for contact in c.contacts):
+    contacts = _loose(c)
+    if contacts and not any(contact.touched for contact in contacts):
         yield {}
 
 
@@ -34,7 +35,7 @@ def no_contact(c: Finished, _: float) -> Iterator[Values]:
 )
 def unfinished_contact(c: Finished, _: float) -> Iterator[Values]:
     """Contacts that press in the last row."""
-    if names := [contact.name for contact in c.contacts if contact.unfinished]:
+    if names := [contact.name for contact in _loose(c) if contact.unfinished]:
         yield dict(which=f"contact {names[0]} was" if len(names) == 1 else f"contacts {', '.join(names)} were")
 
 
@@ -47,7 +48,7 @@ def unfinished_contact(c: Finished, _: float) -> Iterator[Values]:
 )
 def nearly_opened(c: Finished, least: float) -> Iterator[Values]:
     """Least force of each contact between two compressions: another mesh may open it there."""
-    for contact in c.contacts:
+    for contact in _loose(c):
         share = contact.pressure / max(float(contact.pressure.max(initial=0.0)), 1e-300)
         firm, light = np.flatnonzero(share > FIRM), np.flatnonzero(share <= least)
         before = np.searchsorted(firm, light)  # firm rows before each light one: 0 and all are no dips
@@ -65,7 +66,7 @@ def nearly_opened(c: Finished, least: float) -> Iterator[Values]:
 )
 def grazing_touch(c: Finished, least: float) -> Iterator[Values]:
     """Force of further touches of each contact: whether they occur, and how long, is the mesh's."""
-    for contact in c.contacts:
+    for contact in _loose(c):
         if share := grazing_share(contact.pressure):
             yield dict(name=contact.name, share=share, grazing=least)
 
@@ -106,6 +107,12 @@ def friction_across_the_tangent(c: Finished, most: float) -> Iterator[Values]:
         across -= np.abs(contact.normal_force @ side).sum()
         if across > max(most * along, ACROSS * contact.pressure.sum()):
             yield dict(name=contact.name, seen=_listed(side + 0.0), axis=_listed(tangent + 0.0))
+
+
+def _loose(c: Finished) -> list[ContactHistory]:
+    """Contacts without a bond, which holds nodes whether they press or not."""
+    glued = {item.contact for item in c.model.passes if item.bonds is not None}
+    return [contact for k, contact in enumerate(c.contacts) if k not in glued]
 
 
 def _off_axis(contact: ContactHistory, normal: Array, tangent: Array) -> float:

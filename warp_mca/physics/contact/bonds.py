@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from warp_mca.step.state import State
 
 OPPOSED = -0.7  # cosine between the normals of a face and of one of the slave's around a node that it holds, at most
-BEYOND = 0.25  # of a face's width, by which nodes on a fine curved rim may lie beyond the chords of a coarse one
+BEYOND = 0.1  # of a face's width, by which glued nodes may lie beyond its edges, as on the chords of a coarse rim
 OFF = 1e-6  # of a face's edge, by which glued nodes may be off their place at the start: rounding
 
 
