@@ -73,7 +73,7 @@ def test_a_bar_pulled_apart_fails_at_its_strength(sets: tuple[str, str], mu: flo
     assert failed["first_failure"]["at"][0] == 0.0
     stiffness = 2.0 * STIFF.E / 2.0 / (0.5 * SIDE)  # 2 E* over both layers, for each area [Pa/m]
     lost = result.summary["energy"]["contact_loss"]
-    assert lost >= 0.99 * 0.5 * 1e12 * SIDE**2 / stiffness and result.F_n[-1] == 0.0
+    assert lost >= 0.98 * 0.5 * 1e12 * SIDE**2 / stiffness and result.F_n[-1] == 0.0
     assert result.summary["energy_error"] < 1e-4
 
 
