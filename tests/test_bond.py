@@ -217,3 +217,13 @@ def test_bonds_that_would_hold_nothing_or_places_that_move_are_refused():
         prepared(dataclasses.replace(BREAKING, bodies=(apart, BREAKING.bodies[1])))
     with pytest.raises(mca.RequestError, match=r"Bond\.normal = 0"):
         mca.Bond(normal=0.0)
+
+
+@pytest.mark.gpu
+@pytest.mark.parametrize("sets", [("xmax", "xmin"), ("boundary", "boundary")])
+def test_bonds_break_on_a_gpu_as_on_the_cpu(sets: tuple[str, str]):
+    scene = pulled(mca.Bond(normal=2e6, shear=1e6), (-1.0, 0.5), duration=3e-5, contact={"mu": MU}, sets=sets)
+    host, device, again = (mca.run(scene, device=name, precision="float64") for name in ("cpu", "cuda:0", "cuda:0"))
+    assert host.summary["bonds"]["fine–coarse"]["failed"] == device.summary["bonds"]["fine–coarse"]["failed"] == 25
+    assert device.F_n == pytest.approx(host.F_n, abs=1e-3 * np.abs(host.F_n).max())
+    assert all(np.array_equal(device[name], again[name], equal_nan=True) for name in device.history)

@@ -57,13 +57,11 @@ class BondedNodes:
         weight: shape functions of its corners there [-], shape (slave_count, 4), float64.
         limit: force in tension and in shear at which the bond fails, infinite where it never does [N], shape
             (slave_count, 2), float64.
-        edge: longest edge of the face, 0 without a bond [m], shape (slave_count,), float64.
     """
 
     face: Index
     weight: Array
     limit: Array
-    edge: Array
 
 
 def places(contact: Contact, meshes: Mapping[str, Mesh], X: Mapping[str, Array]) -> Place:
@@ -94,9 +92,8 @@ def places(contact: Contact, meshes: Mapping[str, Mesh], X: Mapping[str, Array])
             np.minimum.at(cosine, own[:, k], (mine * normal[own[:, k]]).sum(axis=1))
         near = (found.distance <= contact.bond.gap * longest) & (found.beyond <= BEYOND) & (found.apart < best)
         near &= cosine[nodes] <= OPPOSED
-        best[near], face[near], weight[near], edge[near] = (
-            own[near] for own in (found.apart, which, found.weight, longest)
-        )
+        best[near], face[near] = found.apart[near], which[near]
+        weight[near], edge[near] = found.weight[near], longest[near]
     glued = np.isfinite(best)
     if not glued.any():
         remedy = "no slave node lies on the master's faces at the start; let the surfaces meet, or raise gap"
@@ -139,15 +136,15 @@ def bonded(item: ContactPass, contact: Contact, place: Place, first: int, slave:
     assert contact.bond
     row = np.searchsorted(item.slave, place.node + first)
     count = len(item.slave)
-    face, weight, edge = np.full(count, -1, np.int32), np.zeros((count, 4)), np.zeros(count)
-    face[row], weight[row], edge[row] = place.face, place.weight, place.edge
+    face, weight = np.full(count, -1, np.int32), np.zeros((count, 4))
+    face[row], weight[row] = place.face, place.weight
     off = np.linalg.norm(X[item.slave[row]] - _at(X, item.face[place.face], place.weight), axis=1)
     if (off > OFF * place.edge).any():
         remedy = "another bond or a tie moves its nodes or faces, too; let the meshes of these surfaces meet"
         raise bad_value(f"Contact {'–'.join(contact.sides)}: Bond.gap", contact.bond.gap, remedy)
     strength = [math.inf if value is None else value for value in (contact.bond.normal, contact.bond.shear)]
     limit = node_areas(slave)[:, None] * np.array(strength)
-    return replace(item, bonds=BondedNodes(face=face, weight=weight, limit=limit, edge=edge))
+    return replace(item, bonds=BondedNodes(face=face, weight=weight, limit=limit))
 
 
 def glue(spring: Any, stage: ContactStage) -> None:
