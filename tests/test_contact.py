@@ -213,7 +213,7 @@ def test_without_friction_nothing_tangential_is_left():
     assert np.abs(result.F_t).max() == 0.0
     assert result["E_friction"].max() == 0.0
     assert result["tip_vx"] == pytest.approx(1.0, rel=1e-6)  # rounding of float32 forces
-    assert stage.kernel is contact.plane_kernel(False, False, stage.overlaps != {"refuse"})
+    assert stage.kernel is contact.plane_kernel(False, False, True, stage.laws)
 
 
 def test_springs_are_empty_after_a_bounce():

@@ -171,7 +171,7 @@ def plane_kernel(friction: bool, each: bool, may_overlap: bool = False, laws: La
     """Kernel: contact of slave nodes with an analytic plane that may move along itself; as for surfaces."""
     press = spring_function(friction, laws)
     open_contact = open_function(friction, laws)
-    gap_from_rest = rest_function(may_overlap)
+    gap_from_rest = rest_function(may_overlap, laws.pressed)
     of, Real, Vector, Index = value_function(each), kind(wp.float64, each), kind(wp.vec3d, each), kind(wp.int32, each)
 
     @wp.kernel(enable_backward=False, module="unique")

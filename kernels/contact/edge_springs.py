@@ -39,7 +39,7 @@ def motion_of_old(s: int, v: wp.array(dtype=wp.vec3d), slave: SkinEdges, master:
 def press_kernel(friction: bool, each: bool, laws: Laws) -> Any:
     """Kernel: force of each spring, from spring `first` on: those that `meet_kernel` found edges for, others open."""
     press, open_contact = spring_function(friction, laws), open_function(friction, laws)
-    gap_from_rest = rest_function(True)
+    gap_from_rest = rest_function(True, laws.pressed)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)

@@ -23,11 +23,13 @@ class Laws(NamedTuple):
         normal: of the force along the normal.
         friction: of the laws of friction, in the order in which they change its limit; none for Coulomb's alone.
         bond: whether some slave nodes are glued, see `kernels.contact.bond`.
+        pressed: whether bodies that overlap at the start are pressed apart, see `kernels.contact.spring.shrink`.
     """
 
     normal: str = LINEAR
     friction: tuple[str, ...] = ()
     bond: bool = False
+    pressed: bool = False
 
 
 PLAIN = Laws()

@@ -96,7 +96,7 @@ def settle_functions(friction: bool, laws: Laws) -> tuple[Any, Any]:
     """The functions (settle: press a node on the face that it touches; let_go: release a node that found no face)."""
     press = spring_function(friction, laws)
     open_contact = open_function(friction, laws)
-    gap_from_rest = rest_function(True)
+    gap_from_rest = rest_function(True, laws.pressed)
 
     @wp.func
     def settle(

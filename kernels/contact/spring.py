@@ -104,7 +104,7 @@ def shrink(s: int, spring: Spring) -> wp.float64:
 
 
 @cache
-def rest_function(may_overlap: bool) -> Any:
+def rest_function(may_overlap: bool, pressed: bool) -> Any:
     """The function that measures a gap from the depth at which a spring is free: 0, or the overlap at the start.
 
     That overlap shrinks as the node moves outwards, and does not grow again. Where bodies are pressed apart it shrinks
@@ -115,7 +115,7 @@ def rest_function(may_overlap: bool) -> Any:
     def gap_from_rest(s: int, gap: wp.float64, spring: Spring):
         if wp.static(may_overlap):
             rest = wp.min(spring.rest[s], wp.max(-gap, wp.float64(0.0)))
-            if spring.pressed.shape[0] > 0:
+            if wp.static(pressed):
                 if spring.pressed[s][0] > wp.float64(0.0):
                     rest = spring.rest[s] - shrink(s, spring)
                     gap = wp.min(gap, -rest)  # a node that moves out faster has no force, and the overlap shrinks on
@@ -204,7 +204,7 @@ def spring_function(friction: bool, laws: Laws) -> Any:
             if stick == 1 and mu > wp.float64(0.0):  # a scene of a batch may have no friction
                 spring.stick_impulse[s] = stick_impulse + Fn
         made = energy_made(s, force, energy, spent, du, spring)
-        if spring.pressed.shape[0] > 0:  # work that brings the overlap in, of the forces at both ends of the step
+        if wp.static(laws.pressed):  # work that brings the overlap in, of the forces at both ends of the step
             given = half * (wp.length(pressure(s, spring)) + Fn) * spring.pressed[s][1]
             made -= given
             spring.drive[s] = spring.drive[s] + given

@@ -84,9 +84,9 @@ class ContactStage:
         self.slave_scene = per_scene(slaves)
         self.slave = wp.array(self._join("slave"), dtype=wp.int32)
         self.stiffness = wp.array(self._join("stiffness"), dtype=wp.float64)
-        self.mu = numbers([item.mu for item in items])
-        self.overlaps = {item.initial_overlap for item in items}
-        self.laws = Laws(items[0].law, items[0].friction, any(item.bonds is not None for item in items))
+        self.mu, self.overlaps = numbers([item.mu for item in items]), {item.initial_overlap for item in items}
+        bonded, pressed = any(item.bonds is not None for item in items), "press" in self.overlaps
+        self.laws = Laws(items[0].law, items[0].friction, bonded, pressed)
         check_dashpots(items)
         rows = np.repeat([item.parameters for item in items], np.diff(self.springs), axis=0)
         self.parameters = wp.array(rows, dtype=wp.float64, ndim=2)
