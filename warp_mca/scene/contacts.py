@@ -162,7 +162,10 @@ class Contact(_Springs):
         for held, why in (
             (isinstance(self.master, RigidPlane), "a rigid plane has no faces to glue to; fix the nodes instead"),
             (self.two_way, "the slave's nodes alone are glued; leave two_way off"),
-            (not isinstance(self.law, Penalty | DampedPenalty | None), "its springs are linear; leave the contact's law out"),
+            (
+                not isinstance(self.law, Penalty | DampedPenalty | None),
+                "its springs are linear; leave the contact's law out",
+            ),
         ):
             if self.bond and held:
                 raise bad_value("Contact.bond", self.bond, why)
