@@ -13,7 +13,7 @@ from warp_mca.physics.contact.surfaces import is_curved_contact
 from warp_mca.physics.elements import ELEMENTS
 from warp_mca.scene import Contact
 from warp_mca.watch.ledger import MIN_EXCHANGE
-from warp_mca.watch.row import Array, Context, Finished, SpringShare, Values, row, sides_of
+from warp_mca.watch.row import Context, Finished, SpringShare, Values, row, sides_of
 from warp_mca.watch.vibration import impedance, shadow
 
 if TYPE_CHECKING:
