@@ -117,13 +117,15 @@ def way_back_function(sides: int) -> Any:
         the slave. So does a node that slides over from another master, flush with this one. Such a node then runs into
         the face across the edge, although it slides on the side. It belongs to the side if faces of the slave oppose
         the side and if it lies no deeper below it than usual. If it slid off that side, or if no face of the slave
-        opposes the face that it runs into, it may lie as deep as nodes in front of a face count as above it.
+        opposes the face that it runs into, it may lie as deep as nodes in front of a face count as above it. Of several
+        sides, that on which it was pressed goes first, then the shallowest; it never leaves such a side for others.
         """
         i = at.slaves.node[s]
         way = WayBack()
         way.spring = -1
         shallowest = wp.float64(FAR)
         edge = edge_of(near)
+        slides = usual_depth(at, s, near.face, near.normal, recent_force) > wp.float64(0.0)
         for q in range(begin, begin + wp.static(sides)):
             if q != e and spring.held[e] < wp.float64(ANY_DEPTH):
                 home = nearest_face(at.X, at.u, at.master, q, at.X[i] + at.u[i], along)
@@ -143,8 +145,13 @@ def way_back_function(sides: int) -> Any:
                             limit = wp.float64(0.5) * edge
                         its = opposition(at, s, home.normal)
                         within = -home.gap <= limit or slides_at(home.gap, usual, edge)
-                        if its >= wp.float64(OPPOSES) and within and -home.gap < shallowest:
+                        pressed = usual > wp.float64(0.0)
+                        better = pressed and not slides
+                        if pressed == slides:
+                            better = -home.gap < shallowest
+                        if its >= wp.float64(OPPOSES) and within and (better or (slid and way.spring < 0)):
                             shallowest = -home.gap
+                            slides = slides or pressed
                             way.spring = q
                             way.face = home.face
                             way.normal = home.normal
