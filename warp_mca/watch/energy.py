@@ -26,6 +26,7 @@ PEAK_LOSS = 0.3
 # Force of a flat contact over that of one wave up to which it may be that wave: with default springs, and with others,
 # which may ring at 3.4 times that force.
 WAVE = (1.3, 4.0)
+WEAK = 0.7  # the same below which springs that were given are softer than waves
 
 
 @row(
@@ -95,9 +96,7 @@ def spring_shares(c: Context, ledger: Ledger, names: Sequence[str]) -> dict[str,
     """Energy in the springs of each contact as a share s of what the bodies have exchanged, when its force is greatest.
 
     What is exchanged is kinetic energy gained or lost since the start, or energy that is not kinetic, whichever is
-    greater, as for `Ledger.exchange_error`. None where there is no force, or hardly anything was exchanged. The loss of
-    the peak is `PEAK_LOSS` s where surfaces are curved. Where they are flat it is that of a mass on two springs in
-    series, 1 - sqrt(1 - s), but none of the force of a single wave.
+    greater, as for `Ledger.exchange_error`. None where there is no force, or hardly anything was exchanged.
 
     Args:
         c: scene, meshes and model.
@@ -109,16 +108,14 @@ def spring_shares(c: Context, ledger: Ledger, names: Sequence[str]) -> dict[str,
     stored = sum(energy.values(), np.zeros(len(work)))
     exchanged = np.maximum(np.abs(kinetic - kinetic[:1]), stored - kinetic)
     found: dict[str, SpringShare | None] = dict.fromkeys(names)
-    for k, (name, contact) in enumerate(zip(names, c.scene.contacts, strict=True)):
+    for k, name in enumerate(names):
         own = springs[:, [item.contact == k for item in c.model.passes]]
         force = own[..., PRESSURE].sum(axis=1)
         row = int(force.argmax()) if len(force) else 0
         if len(force) and force[row] > 0.0 and exchanged[row] > MIN_EXCHANGE * ledger.kept.energy_scale:
-            share, loss = float(own[row, :, SPRING_ENERGY].sum() / exchanged[row]), PEAK_LOSS
-            if isinstance(contact, Contact) and k not in _curved(c.model):
-                beyond = force[row] > _wave_force(c, k, contact, ledger.time())
-                loss = 1.0 / (1.0 + math.sqrt(1.0 - min(share, 1.0))) if beyond else 0.0
-            found[name] = SpringShare(share=share, loss=loss * share)
+            share = float(own[row, :, SPRING_ENERGY].sum() / exchanged[row])
+            loss = _loss(c, k, share, float(force[row]), ledger.time())
+            found[name] = SpringShare(share=share, loss=loss)
     return found
 
 
@@ -127,8 +124,22 @@ def _curved(model: Model) -> set[int]:
     return {item.contact for item in model.passes if is_curved_contact(model.X, item)}
 
 
+def _loss(c: Context, k: int, share: float, force: float, time: float) -> float:
+    """Relative loss of the peak of contact k whose springs held a share then: `PEAK_LOSS` of it on curved surfaces.
+
+    On flat ones it is that of a mass on two springs in series, 1 - sqrt(1 - s), but none of the force of a single wave.
+    """
+    contact = c.scene.contacts[k]
+    if not isinstance(contact, Contact) or k in _curved(c.model):
+        return PEAK_LOSS * share
+    given, wave = contact.penalty is not None, _wave_force(c, k, contact, time)
+    if force > WAVE[given] * wave:
+        return 1.0 - math.sqrt(1.0 - min(share, 1.0))
+    return PEAK_LOSS * share if given and force < WEAK * wave else 0.0
+
+
 def _wave_force(c: Context, k: int, contact: Contact, time: float) -> float:
-    """Greatest force that a single wave may give in contact k by `time` [N]: WAVE Z v A, inf of rigid bodies."""
+    """Force that a single wave gives in contact k by `time` [N]: Z v A, inf of rigid bodies."""
     names, axis = sides_of(contact), c.model.contact_axes[k, 0]
     means = [c.model.V[c.nodes(name)].mean(axis=0) for name in names]
     between = (means[0] - means[1] if len(means) > 1 else means[0]) + time * c.model.gravity[0]
@@ -137,5 +148,4 @@ def _wave_force(c: Context, k: int, contact: Contact, time: float) -> float:
     if not soft:
         return math.inf
     Z = 1.0 / sum(1.0 / own for own in soft)
-    area = min(shadow(c, name, normal) for name in names)
-    return WAVE[contact.penalty is not None] * Z * abs(float(between @ normal)) * area
+    return Z * abs(float(between @ normal)) * min(shadow(c, name, normal) for name in names)
