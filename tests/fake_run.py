@@ -16,6 +16,7 @@ def fake(scene: mca.Scene, order: float = 1.5, share: float = 0.0, size: float =
         "contact_open_at_end": False,
         "max_plastic_strain": 0.0,
         "contact_spring_share": {"it": share},
+        "contact_spring_loss": {"it": -0.3 * share},
         "n_elements": 100,
         "n_steps": 100,
         "precision": "mixed",

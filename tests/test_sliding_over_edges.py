@@ -1,5 +1,7 @@
 """Slave nodes that slide over an edge of their master: off it and back, or on to a body that lies flush with it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from impacts import finished, momentum, result_of
@@ -8,8 +10,6 @@ import warp_mca as mca
 
 W, G = 0.01, 3000.0  # edge of the block [m], acceleration along each axis [m/s^2]
 SOFT = mca.Elastic(E=2e9, nu=0.3, rho=1200.0)
-# With nodes of both sides kept out, a corner that springs let in may catch, at some time steps and not at others.
-BY_CHANCE = pytest.mark.xfail(reason="at some time steps a corner of the master catches", strict=False)
 
 
 def turn(rotation: tuple) -> np.ndarray:
@@ -69,7 +69,6 @@ def velocity(scene: mca.Scene, **settings) -> tuple[mca.Result, np.ndarray]:
         (4.0, 2, 0.2, {"direction": (1.0, 0.0, 0.6), "penalty": 2.0}),
         (4.0, 2, 0.0, {}),
         (4.0, 2, 0.2, {"two_way": True}),
-        pytest.param(1.0, 3, 0.5, {"two_way": True, "element": "hex8"}, marks=BY_CHANCE),
         (3.5, 5, 0.2, {"m": 4, "rotation": (0.3, -0.7, 1.1), "penalty": 0.3}),
         (4.5, 5, 0.2, {"m": 4, "rigid": True}),
         (3.5, 5, 0.1, {"direction": (1.0, 0.0, 0.6)}),
@@ -124,9 +123,9 @@ def row(n: int, m: int, merged: bool, v: float, element: str = mca.Body.element,
     ("n", "m", "v", "contact"),
     [
         (2, 2, 3.0, {}),
-        pytest.param(2, 2, 3.0, {"two_way": True}, marks=BY_CHANCE),
-        pytest.param(5, 4, 3.0, {}, marks=BY_CHANCE),
-        pytest.param(4, 2, 10.0, {"two_way": True, "element": "hex8"}, marks=BY_CHANCE),
+        (2, 2, 3.0, {"two_way": True}),
+        (5, 4, 3.0, {}),
+        (4, 2, 10.0, {"two_way": True, "element": "hex8"}),
         (2, 2, 3.0, {"mu": 0.1}),
     ],
     ids=str,
@@ -137,6 +136,37 @@ def test_a_block_that_slides_over_a_seam_keeps_its_speed(n: int, m: int, v: floa
     result, w = velocity(scene)
     assert w[0] == pytest.approx(v - contact.get("mu", 0.0) * G * scene.impact.duration, rel=5e-3)
     assert result.summary["energy_error"] < 5e-3
+
+
+def caught(scene: mca.Scene, scale: float, mu: float) -> float:
+    """Greatest force across the plates' normal that friction does not explain, over the greatest normal force."""
+    half = replace(scene.impact, time_step_scale=scale, duration=0.5 * scene.impact.duration)
+    result, _ = velocity(replace(scene, impact=half))
+    assert result.summary["energy_error"] < 5e-3
+    force = np.sum([contact.force for contact in result.contacts], axis=0)
+    return float((np.linalg.norm(force[:, [0, 2]], axis=1) - mu * force[:, 1]).max() / force[:, 1].max())
+
+
+@pytest.mark.parametrize(
+    ("n", "m", "v", "merged", "scale", "contact"),
+    [
+        (1, 4, 3.0, False, 0.679, {"mu": 0.2, "penalty": 3.0}),
+        (1, 4, 3.0, True, 0.807, {"mu": 0.1, "penalty": 1.0}),
+        (1, 2, 4.0, False, 0.946, {"mu": 0.1, "penalty": 0.3, "two_way": True}),
+        (3, 2, 3.0, True, 0.761, {"mu": 0.2, "penalty": 1.0}),
+        (2, 4, 10.0, True, 0.781, {"penalty": 1.0, "two_way": True}),
+    ],
+    ids=str,
+)
+def test_seams_do_not_catch_at_any_step(n: int, m: int, v: float, merged: bool, scale: float, contact: dict):
+    """Plates sag more than stiff springs give: at some steps blocks lost 60 % of the speed."""
+    assert caught(row(n, m, merged, v, "hex8", **contact), scale, contact.get("mu", 0.0)) < 0.02
+
+
+@pytest.mark.parametrize("scale", [0.5, 0.9])
+def test_a_block_that_rocks_at_an_edge_is_not_caught(scale: float):
+    scene, _ = slide(1.0, 3, mu=0.5, duration=2e-3, two_way=True, element="hex8")
+    assert caught(scene, scale, 0.5) < 0.02
 
 
 @pytest.mark.parametrize("two_way", [False, True])

@@ -50,6 +50,46 @@ def test_a_ball_gets_the_springs_that_hertz_asks_for(target: str):
     assert summary["contact_spring_loss"]["sphere–" + target] == -PEAK_LOSS * share
 
 
+@pytest.mark.parametrize("slave", ["pad", "block"])
+@pytest.mark.parametrize("cells", [2, 5])
+def test_what_springs_take_of_a_block_on_a_soft_pad_is_said(cells: int, slave: str):
+    """A block M on a bar m held at its end: Z v sqrt(M / m), and after Boussinesq Z v more as waves run up and down."""
+    size, foam = 0.02, mca.Elastic(E=5e6, nu=0.0, rho=50.0)
+    pad = mca.Box(size=(size, size, size), divisions=(2, 2, cells))
+    block = mca.Box(size=(size, size, size), divisions=(1, 1, 1))
+    bodies = (
+        mca.Body(name="pad", geometry=pad, material=foam),
+        mca.Body(
+            name="block", geometry=block, material=STEEL, position=(0.0, 0.0, size + 1e-6), velocity=(0.0, 0.0, -1.0)
+        ),
+    )
+    skins = {"pad": mca.Surface(body="pad", nodes="zmax"), "block": mca.Surface(body="block", nodes="zmin")}
+    master = skins["block" if slave == "pad" else "pad"]
+    scene = mca.Scene(
+        name="pad",
+        bodies=bodies,
+        contacts=(mca.Contact(slave=skins[slave], master=master),),
+        fixed=(mca.Fixed(body="pad", nodes="zmin"),),
+        impact=mca.ImpactPhase(duration=2e-3, output_interval=1e-5),
+    )
+    result = mca.run(scene)
+    (loss,) = result.summary["contact_spring_loss"].values()
+    wave = np.sqrt(5e6 * 50.0) * size**2
+    slow = wave * np.sqrt(7800.0 / 50.0)
+    assert 0.96 * slow < result.F_n.max() / (1.0 + loss) < slow + wave
+    assert any(f"some {-loss:.0%} below that of stiff springs" in warning for warning in result.warnings)
+
+
+def test_springs_take_nothing_of_the_force_of_a_wave():
+    """A cube of four cells strikes a wall: rho c v A, though springs hold half of the energy."""
+    scene = drop(1.0, None)
+    cube = replace(scene.bodies[0], geometry=mca.Box(size=(0.01, 0.01, 0.01), divisions=(2, 4, 2)))
+    summary = mca.run(replace(scene, bodies=(cube,)), duration=8e-6).summary
+    assert summary["F_n_max"] == pytest.approx(np.sqrt(200e9 * 7800.0) * 1e-4, rel=0.05)
+    assert summary["contact_spring_share"]["cube–plane"] > 0.3
+    assert summary["contact_spring_loss"]["cube–plane"] == 0.0
+
+
 def test_finer_meshes_take_softer_springs():
     """The layer of springs of one cell's depth is as thin as the cell: its factor falls with it."""
 

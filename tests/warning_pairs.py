@@ -38,7 +38,7 @@ from warp_mca.watch import (
     vibration,
 )
 from warp_mca.watch.bent_cells import COLUMNS, FLOWING, MISSED, RIGHT
-from warp_mca.watch.row import Row
+from warp_mca.watch.row import Row, SpringShare
 
 Pair = Callable[[bool], list[str]]
 PAIRS: dict[str, Pair] = {}  # by the name of a row: what is said beyond its limit, and just within
@@ -200,7 +200,8 @@ def _(beyond: bool) -> list[str]:
 def _(beyond: bool) -> list[str]:
     scene = stacked(2, 2)
     given = replace(scene, contacts=tuple(replace(contact, penalty=1.0) for contact in scene.contacts))
-    return told_of(energy.soft_springs, given, shares={"c": over(energy.soft_springs, beyond)})
+    springs = SpringShare(share=0.2, loss=over(energy.soft_springs, beyond))
+    return told_of(energy.soft_springs, given, shares={"c": springs})
 
 
 @pair(energy.lagging_vectors)

@@ -73,6 +73,16 @@ def lies_on(
 
 
 @wp.func
+def hovers(at: Surfaces, near: Nearest) -> bool:
+    """Whether a node is just in front of a face of its side, so that it did not slide off the side."""
+    found = bool(False)
+    if near.front_face >= 0:
+        across = area_vector(at.X, at.u, at.master.face, near.front_face)
+        found = near.front_rank < wp.float64(ABOVE) * wp.sqrt(wp.float64(0.5) * wp.length(across))
+    return found
+
+
+@wp.func
 def meet_edge(
     v: wp.array(dtype=wp.vec3d),
     at: Surfaces,
@@ -220,7 +230,7 @@ def release_function(friction: bool, sides: int, laws: Laws) -> Any:
         flag_out: wp.array2d(dtype=wp.int32),
     ) -> wp.vec3d:
         support = no_support()
-        if node.listed > 1 and (newcomer < 0 or newcomer == e):
+        if node.listed > 1 and (newcomer < 0 or newcomer == e) and not hovers(at, near):
             support = find_support(at, s, e, node, front_gap, front_face, along, spring)
         if support.edge < 0:
             let_go(e, at.slaves.node[s], v, at.master.face, dt, near.front, spring.held[e], spring)

@@ -6,13 +6,15 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.edges import Surfaces, greatest_stiffness, is_on_rim, opposition
-from warp_mca.kernels.contact.nearest import ABOVE, SLACK, Nearest, edge_of, nearest_face
+from warp_mca.kernels.contact.nearest import ABOVE, SLACK, Nearest, edge_of, is_beside, nearest_face
 from warp_mca.kernels.contact.pairs import same_solid
 from warp_mca.kernels.contact.projection import lies_below
 from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring
 
 OPPOSES = 0.5  # difference of cosines by which the faces of a slave clearly oppose one side more than another
 _USUAL = 4.0  # largest depth of a node that comes over an edge, over the depth at which a spring bears the recent force
+_SAGS = 5e-3  # the same of a node that was pressed, besides, as a share of an edge: bodies sag under stiff springs
+_RIM = 0.01  # fraction of half an edge by which such a node may lie off the face to which it comes
 _FADES = 0.99  # share of a recent force that is kept from step to step
 _ALONG = 0.7  # least cosine between that force and the normal
 
@@ -73,7 +75,8 @@ def usual_depth(
 @wp.func
 def slides_at(depth: wp.float64, usual: wp.float64, edge: wp.float64) -> bool:
     """Whether a node at this distance from a face, on either side, may slide on it, given the `usual_depth`."""
-    return wp.abs(depth) <= wp.float64(_USUAL) * usual + wp.float64(SLACK) * edge
+    slack = wp.float64(wp.where(usual > wp.float64(0.0), _SAGS, SLACK))
+    return wp.abs(depth) <= wp.float64(_USUAL) * usual + slack * edge
 
 
 @wp.func
@@ -114,17 +117,21 @@ def way_back_function(sides: int) -> Any:
         the slave. So does a node that slides over from another master, flush with this one. Such a node then runs into
         the face across the edge, although it slides on the side. It belongs to the side if faces of the slave oppose
         the side and if it lies no deeper below it than usual. If it slid off that side, or if no face of the slave
-        opposes the face that it runs into, it may lie as deep as nodes in front of a face count as above it.
+        opposes the face that it runs into, it may lie as deep as nodes in front of a face count as above it. Of several
+        sides, that on which it was pressed goes first, then the shallowest; it never leaves such a side for others.
         """
         i = at.slaves.node[s]
         way = WayBack()
         way.spring = -1
         shallowest = wp.float64(FAR)
         edge = edge_of(near)
+        slides = usual_depth(at, s, near.face, near.normal, recent_force) > wp.float64(0.0)
         for q in range(begin, begin + wp.static(sides)):
             if q != e and spring.held[e] < wp.float64(ANY_DEPTH):
                 home = nearest_face(at.X, at.u, at.master, q, at.X[i] + at.u[i], along)
-                if home.face >= 0 and not home.beside and same_solid(at.pairs, near.face, wp.max(home.face, 0)):
+                f = wp.max(home.face, 0)
+                above = not is_beside(home.at, at.master.face[f, 2] == at.master.face[f, 3], wp.float64(_RIM))
+                if home.face >= 0 and above and same_solid(at.pairs, near.face, f):
                     if lies_below(at.X, at.u, at.master.face, near.face, home.face, home.normal):
                         usual = usual_depth(at, s, home.face, home.normal, recent_force)
                         left = spring.left[q]
@@ -138,8 +145,13 @@ def way_back_function(sides: int) -> Any:
                             limit = wp.float64(0.5) * edge
                         its = opposition(at, s, home.normal)
                         within = -home.gap <= limit or slides_at(home.gap, usual, edge)
-                        if its >= wp.float64(OPPOSES) and within and -home.gap < shallowest:
+                        pressed = usual > wp.float64(0.0)
+                        better = pressed and not slides
+                        if pressed == slides:
+                            better = -home.gap < shallowest
+                        if its >= wp.float64(OPPOSES) and within and (better or (slid and way.spring < 0)):
                             shallowest = -home.gap
+                            slides = slides or pressed
                             way.spring = q
                             way.face = home.face
                             way.normal = home.normal

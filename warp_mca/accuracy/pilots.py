@@ -24,7 +24,6 @@ from warp_mca.accuracy.request import Accuracy
 from warp_mca.accuracy.variant import Variant
 from warp_mca.base.errors import GuardError, bad_value
 from warp_mca.scene import Scene
-from warp_mca.watch.energy import PEAK_LOSS
 
 if TYPE_CHECKING:
     from warp_mca.results.result import Result
@@ -220,8 +219,8 @@ class Springs:
 
 def _spring_loss(result: Result) -> float:
     """Estimated loss of the greatest force in contact springs [-]."""
-    shares = result.summary["contact_spring_share"].values()
-    return PEAK_LOSS * max((share for share in shares if share is not None), default=0.0)
+    losses = result.summary["contact_spring_loss"].values()
+    return max((-loss for loss in losses if loss is not None), default=0.0)
 
 
 def _stiffer(scene: Scene, asked: Accuracy, first: Result) -> Mapping[str, Any] | None:

@@ -24,11 +24,11 @@ from warp_mca.step.state_figures import (
     max_speed,
     rigid_bodies,
 )
-from warp_mca.watch.energy import peak_losses, spring_shares
+from warp_mca.watch.energy import spring_shares
 from warp_mca.watch.ledger import Ledger
 from warp_mca.watch.looks import SceneLooks
 from warp_mca.watch.mass_report import body_report, mass_report
-from warp_mca.watch.row import Finished
+from warp_mca.watch.row import Context, Finished, SpringShare
 from warp_mca.watch.table import told_at_the_end
 
 if TYPE_CHECKING:
@@ -124,7 +124,7 @@ class SceneRun:
             origin: times count from then on [s], after the first row of the impact.
         """
         ready, own = self.ready, self.rows(before[-1].facts["end"] if before else 0.0, origin)
-        shares = spring_shares(self.ledger, ready.model, contact_names(ready.scene.contacts))
+        shares = spring_shares(self._context, self.ledger, contact_names(ready.scene.contacts))
         summary = summarise(own.history, self._facts(wall, shares), own.contacts)
         told = self._told(stopped is not None, history=own.history, contacts=own.contacts, shares=shares, origin=origin)
         found = joined(ready.scene, ready.probes, [*before, own])
@@ -134,11 +134,15 @@ class SceneRun:
         return Result(summary=summary, warnings=(*told, *said), stopped=stopped, **found)
 
     @property
+    def _context(self) -> Context:
+        return Context(scene=self.ready.scene, meshes=self.ready.meshes, model=self.ready.model)
+
+    @property
     def step_count(self) -> int:
         """Steps that its rows cover [-], fewer than asked where it ended early."""
         return self.steps.per_interval * max(self.ledger.kept.count - 1, 0)
 
-    def _facts(self, wall: Mapping[str, float], shares: Mapping[str, float | None]) -> dict[str, Any]:
+    def _facts(self, wall: Mapping[str, float], shares: Mapping[str, SpringShare | None]) -> dict[str, Any]:
         scene, start, model, ledger = self.ready.scene, self.ready.start, self.ready.model, self.ledger
         count = self.step_count
         more: dict[str, Any] = {
@@ -164,7 +168,8 @@ class SceneRun:
         if any(model.penalties):
             names = contact_names(scene.contacts)
             more["penalty"] = {name: vars(item) for name, item in zip(names, model.penalties, strict=True) if item}
-        more |= {"contact_spring_share": dict(shares), "contact_spring_loss": peak_losses(shares)}
+        more["contact_spring_share"] = {name: item and item.share for name, item in shares.items()}
+        more["contact_spring_loss"] = {name: item and -item.loss for name, item in shares.items()}
         if any(item.bonds for item in model.passes):
             names = contact_names(scene.contacts)
             found = bond_reports(self.solver.contacts, self.state, self.index, self.solver.model.X)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,16 +11,22 @@ import numpy as np
 from warp_mca.kernels.records.columns import PRESSURE, SPRING_ENERGY
 from warp_mca.physics.contact.surfaces import is_curved_contact
 from warp_mca.physics.elements import ELEMENTS
+from warp_mca.scene import Contact
 from warp_mca.watch.ledger import MIN_EXCHANGE
-from warp_mca.watch.row import Finished, Values, row
+from warp_mca.watch.row import Context, Finished, SpringShare, Values, row, sides_of
+from warp_mca.watch.vibration import impedance, shadow
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
     from warp_mca.watch.ledger import Ledger
 
-# Relative loss of the force peak over the share of the exchanged energy that springs hold then; measured on balls and
-# links within a factor of 2, see docs/decisions.md.
+# Relative loss of the force peak of a curved contact over the share of the exchanged energy that springs hold then;
+# measured on balls and links within a factor of 2, see docs/decisions.md.
 PEAK_LOSS = 0.3
+# Force of a flat contact over that of one wave up to which it may be that wave: with default springs, and with others,
+# which may ring at 3.4 times that force.
+WAVE = (1.3, 4.0)
+WEAK = 0.7  # the same below which springs that were given are softer than waves
 
 
 @row(
@@ -52,20 +59,21 @@ def turned_edge(c: Finished, _: float) -> Iterator[Values]:
 @row(
     "contact springs held {share:.0%} of the energy that bodies had exchanged when the force of {name} was greatest: "
     "its peak is some {loss:.0%} below that of stiff springs, and later;",
-    "raise the contact's penalty{default}, or refine the mesh there",
-    0.25,
-    "of the exchanged energy at most",
+    "{remedy}, or refine the mesh there",
+    0.03,
+    "of the force peak at most",
 )
 def soft_springs(c: Finished, most: float) -> Iterator[Values]:
-    """Energy in the springs of each contact when its force is greatest.
-
-    Springs of flat ends are by default as soft as cells: waves that have reached few cells leave them a large share.
-    """
-    curved = {item.contact for item in c.model.passes if is_curved_contact(c.model.X, item)}
-    for k, ((name, share), contact) in enumerate(zip(c.shares.items(), c.scene.contacts, strict=True)):
-        if share is not None and share > most and (contact.penalty is not None or k in curved):
-            default = "" if contact.penalty is None else " or leave it to its default"
-            yield dict(share=share, name=name, loss=PEAK_LOSS * share, default=default)
+    """Estimated loss of each contact's force peak by the energy in its springs then, see `spring_shares`."""
+    curved = _curved(c.model)
+    for k, ((name, springs), contact) in enumerate(zip(c.shares.items(), c.scene.contacts, strict=True)):
+        if springs is not None and springs.loss > most:
+            remedy = "raise the contact's penalty"
+            if contact.penalty is None and k not in curved:
+                remedy = "give the contact penalty=10"
+            elif contact.penalty is not None and k in curved:
+                remedy += " or leave it to its default"
+            yield dict(share=springs.share, name=name, loss=springs.loss, remedy=remedy)
 
 
 @row(
@@ -84,31 +92,60 @@ def lagging_vectors(c: Finished, most: float) -> Iterator[Values]:
         yield dict(hourglass=spent, share=spent / plastic)
 
 
-def spring_shares(ledger: Ledger, model: Model, names: Sequence[str]) -> dict[str, float | None]:
-    """Energy in the springs of each contact as a share of what the bodies have exchanged, when its force is greatest.
+def spring_shares(c: Context, ledger: Ledger, names: Sequence[str]) -> dict[str, SpringShare | None]:
+    """Energy in the springs of each contact as a share s of what the bodies have exchanged, when its force is greatest.
 
     What is exchanged is kinetic energy gained or lost since the start, or energy that is not kinetic, whichever is
     greater, as for `Ledger.exchange_error`. None where there is no force, or hardly anything was exchanged.
 
     Args:
+        c: scene, meshes and model.
         ledger: of the run; rows of its history count.
-        model: of the scene alone.
-        names: of its contacts.
+        names: of the scene's contacts.
     """
     springs, energy = ledger.springs(ledger.table()), ledger.energies()
     work, kinetic = energy.pop("external_work"), energy["kinetic"]
     stored = sum(energy.values(), np.zeros(len(work)))
     exchanged = np.maximum(np.abs(kinetic - kinetic[:1]), stored - kinetic)
-    found: dict[str, float | None] = {}
+    found: dict[str, SpringShare | None] = dict.fromkeys(names)
     for k, name in enumerate(names):
-        own = springs[:, [item.contact == k for item in model.passes]]
+        own = springs[:, [item.contact == k for item in c.model.passes]]
         force = own[..., PRESSURE].sum(axis=1)
         row = int(force.argmax()) if len(force) else 0
-        met = len(force) > 0 and force[row] > 0.0 and exchanged[row] > MIN_EXCHANGE * ledger.kept.energy_scale
-        found[name] = float(own[row, :, SPRING_ENERGY].sum() / exchanged[row]) if met else None
+        if len(force) and force[row] > 0.0 and exchanged[row] > MIN_EXCHANGE * ledger.kept.energy_scale:
+            share = float(own[row, :, SPRING_ENERGY].sum() / exchanged[row])
+            loss = _loss(c, k, share, float(force[row]), ledger.time())
+            found[name] = SpringShare(share=share, loss=loss)
     return found
 
 
-def peak_losses(shares: Mapping[str, float | None]) -> dict[str, float | None]:
-    """Estimated relative error of the greatest force of each contact against that of stiff springs [-]."""
-    return {name: None if share is None else -PEAK_LOSS * share for name, share in shares.items()}
+def _curved(model: Model) -> set[int]:
+    """Contacts of curved surfaces."""
+    return {item.contact for item in model.passes if is_curved_contact(model.X, item)}
+
+
+def _loss(c: Context, k: int, share: float, force: float, time: float) -> float:
+    """Relative loss of the peak of contact k whose springs held a share then: `PEAK_LOSS` of it on curved surfaces.
+
+    On flat ones it is that of a mass on two springs in series, 1 - sqrt(1 - s), but none of the force of a single wave.
+    """
+    contact = c.scene.contacts[k]
+    if not isinstance(contact, Contact) or k in _curved(c.model):
+        return PEAK_LOSS * share
+    given, wave = contact.penalty is not None, _wave_force(c, k, contact, time)
+    if force > WAVE[given] * wave:
+        return 1.0 - math.sqrt(1.0 - min(share, 1.0))
+    return PEAK_LOSS * share if given and force < WEAK * wave else 0.0
+
+
+def _wave_force(c: Context, k: int, contact: Contact, time: float) -> float:
+    """Force that a single wave gives in contact k by `time` [N]: Z v A, inf of rigid bodies."""
+    names, axis = sides_of(contact), c.model.contact_axes[k, 0]
+    means = [c.model.V[c.nodes(name)].mean(axis=0) for name in names]
+    between = (means[0] - means[1] if len(means) > 1 else means[0]) + time * c.model.gravity[0]
+    normal = axis if axis.any() else between / max(float(np.linalg.norm(between)), 1e-30)
+    soft = [impedance(c, name)[0] for name in names if not c.scene.body(name).rigid]
+    if not soft:
+        return math.inf
+    Z = 1.0 / sum(1.0 / own for own in soft)
+    return Z * abs(float(between @ normal)) * min(shadow(c, name, normal) for name in names)

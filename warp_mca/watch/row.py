@@ -110,6 +110,14 @@ class Context:
 
 
 @dataclass(frozen=True, kw_only=True)
+class SpringShare:
+    """Share of the exchanged energy that springs of a contact hold, and the loss of its force peak by that [-]."""
+
+    share: float
+    loss: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class Finished(Context):
     """What is known at the end of the impact phase, or where a guard stopped it.
 
@@ -123,7 +131,7 @@ class Finished(Context):
         bent: energies of bodies [J], as `SceneRecords.stiffened` has them, shape (body_count, COLUMNS), float64.
         history: columns of history.csv, each shape (row_count,), float64.
         contacts: histories of the scene's contacts.
-        shares: energy in the springs of each contact, see `spring_shares`.
+        shares: energy in the springs of each contact, see `spring_shares`; None without force.
         watch: what may go into each other.
         stopped: whether a guard stopped the run.
         origin: when the times that are told begin [s].
@@ -138,7 +146,7 @@ class Finished(Context):
     bent: Array
     history: Mapping[str, Array]
     contacts: Sequence[ContactHistory]
-    shares: Mapping[str, float | None]
+    shares: Mapping[str, SpringShare | None]
     watch: Watch
     stopped: bool
     origin: float

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from warp_mca.kernels.records.columns import FRICTION, IMPULSE, NORMAL_IMPULSE, SPRING_ENERGY
 from warp_mca.physics.contact.surfaces import face_geometry, is_curved_contact
 from warp_mca.physics.elements.cells import body_materials
-from warp_mca.watch.row import Array, Finished, Values, listed_passes, row, sides_of
+from warp_mca.watch.row import Array, Context, Finished, Values, listed_passes, row, sides_of
 
 if TYPE_CHECKING:
     from warp_mca.physics.contact.surfaces import ContactPass
@@ -194,12 +194,22 @@ def _greatest_force(c: Finished, contact: Contact, item: ContactPass, time: floa
 
 
 def _impedance(c: Finished, body: str, normal: Array) -> tuple[float, float]:
-    """Greatest rho c [kg/(m^2 s)] of its materials times the area of its shadow [kg/s], and the greatest c [m/s]."""
+    """Impedance of a body times the area of its shadow [kg/s], and its greatest wave speed [m/s]."""
+    Z, speed = impedance(c, body)
+    return Z * shadow(c, body, normal), speed
+
+
+def impedance(c: Context, body: str) -> tuple[float, float]:
+    """Greatest rho c [kg/(m^2 s)] of a body's materials, and the greatest c [m/s]."""
     materials = [material for material, _ in body_materials(c.scene.body(body), c.meshes[body])]
     speeds = [material.wave_speeds["dilatational"] for material in materials]
+    return max(m.rho * speed for m, speed in zip(materials, speeds, strict=True)), max(speeds)
+
+
+def shadow(c: Context, body: str, normal: Array) -> float:
+    """Area of the shadow that a body casts along a unit normal [m^2]."""
     faces = c.meshes[body].boundary[0]
-    shadow = 0.5 * float(np.abs(face_geometry(c.model.X[c.nodes(body)], faces)[1] @ normal).sum())
-    return max(m.rho * speed for m, speed in zip(materials, speeds, strict=True)) * shadow, max(speeds)
+    return 0.5 * float(np.abs(face_geometry(c.model.X[c.nodes(body)], faces)[1] @ normal).sum())
 
 
 def _is_held(c: Finished, body: str, normal: Array) -> bool:
