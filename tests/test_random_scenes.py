@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 
 import numpy as np
@@ -127,8 +128,6 @@ def test_a_run_is_judged():
 
 def test_a_scene_whose_contact_is_taken_out_is_seen(monkeypatch):
     """The judge does not ask the contact."""
-    import dataclasses
-
     from benchmarks.random_scenes import measure as module
 
     def without(seed: int, family: str, times: int = 1):
@@ -139,6 +138,14 @@ def test_a_scene_whose_contact_is_taken_out_is_seen(monkeypatch):
     monkeypatch.setattr(module, "crossing", without)
     row = measure(("crossing", 6, "cpu", False))
     assert row["seen"] == "through" and row["momentum_off"] < 1e-6
+
+
+@pytest.mark.parametrize("seed", [326, 342])
+def test_bodies_that_are_apart_are_not_refused(seed):
+    """Nodes behind faces of a blade that lean, though beside it, were said to lie inside it by `contacts="all"`."""
+    scene = crossing(seed).scene
+    short = dataclasses.replace(scene.impact, duration=1e-9, output_interval=1e-9)
+    assert mca.run(dataclasses.replace(scene, impact=short)).summary["extremes"]["F_n_max"] == 0.0
 
 
 def test_plain_scenes_follow_from_their_seeds():
