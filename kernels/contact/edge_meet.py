@@ -84,7 +84,7 @@ def predecessor(
                 if share_an_end(master, wp.max(g, 0), b):
                     pressed = spring.force[r] - spring.tangential[r]
                     if wp.dot(pressed, normal) > wp.float64(0.7) * wp.length(pressed):
-                        if not crossing(X, u, v, slave, master, other, g, wp.float64(0.0), True).touches:
+                        if not crossing(X, u, v, slave, master, other, g, wp.float64(0.0), True).within:
                             best = r
                             depth = spring.held[r]
     return best

@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.contact.edges import Surfaces, opposition
+from warp_mca.kernels.contact.edges import Surfaces, greatest_stiffness, opposition
 from warp_mca.kernels.contact.nearest import Nearest, edge_of
 from warp_mca.kernels.contact.projection import area_vector, is_edge
 from warp_mca.kernels.contact.settle import Touch
@@ -188,7 +188,9 @@ def choice_functions(sides: int) -> tuple[Any, Any]:
             if takes_over(at, s, near, touch.du, other, spring):
                 chosen.newcomer = e
                 chosen.leaver = other
-                chosen.begins = spring.held[other] - spring.rest[other]
+                # the newcomer holds the energy of the leaver
+                softer = spring.stiffness[other] / greatest_stiffness(at, s, near.face)
+                chosen.begins = wp.sqrt(softer) * (spring.held[other] - spring.rest[other])
         return chosen
 
     @wp.func
