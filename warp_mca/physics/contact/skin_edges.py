@@ -17,6 +17,7 @@ from warp_mca.physics.contact.surfaces import ContactPass, Faces
 from warp_mca.scene import Contact
 
 BLUNT = math.radians(3.0)  # angle between the faces beside an edge from which on it may press another
+QUARTER = 0.25  # of the area of a surface that has faces as small as those by which it is judged
 WIDER = 1.5  # ratio of widths of the slave's and the master's faces from which on the master's nodes could pass unseen
 COARSE = 0.5  # length of an edge that nodes see pass, as a share of the radius of what passes, at most
 
@@ -61,14 +62,17 @@ def skin_edges(X: Array, faces: Faces) -> SkinEdges:
 
 
 def is_two_way(contact: Contact, slave: Faces, master: Faces | None) -> bool:
-    """Whether the master's nodes are kept out of the slave's faces, too: as the contact says, else if these are wider.
-
-    That is the lesser of the ratio of the smallest and that of the usual: faces far from contact may be of any size.
-    """
+    """Whether the master's nodes are kept out of the slave's faces, too: as the contact says, or if these are wider."""
     if contact.two_way is not None or master is None:
         return bool(contact.two_way)
-    ratio = min(slave.area.min() / master.area.min(), np.median(slave.area) / np.median(master.area))
-    return bool(math.sqrt(ratio) > WIDER)
+    return _width(slave.area) > WIDER * _width(master.area)
+
+
+def _width(area: Array) -> float:
+    """Width of the faces that a QUARTER of a surface is smaller than [m]: those of the ends of a rod may be tiny."""
+    area = np.sort(area)
+    covered = np.cumsum(area)
+    return math.sqrt(area[np.searchsorted(covered, QUARTER * covered[-1])])
 
 
 @joinable
