@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,6 +22,7 @@ from benchmarks.random_scenes.page import write_page
 from benchmarks.random_scenes.placing import chord, travel
 from benchmarks.random_scenes.shapes import KINDS, finer, shape
 from warp_mca.geometry.cell_types import triangulated
+from warp_mca.physics.contact.skin_edges import is_two_way
 
 W = 0.01
 DOWN = np.array([0.0, -1.0, 0.0])
@@ -127,8 +130,6 @@ def test_a_run_is_judged():
 
 def test_a_scene_whose_contact_is_taken_out_is_seen(monkeypatch):
     """The judge does not ask the contact."""
-    import dataclasses
-
     from benchmarks.random_scenes import measure as module
 
     def without(seed: int, family: str, times: int = 1):
@@ -139,6 +140,31 @@ def test_a_scene_whose_contact_is_taken_out_is_seen(monkeypatch):
     monkeypatch.setattr(module, "crossing", without)
     row = measure(("crossing", 6, "cpu", False))
     assert row["seen"] == "through" and row["momentum_off"] < 1e-6
+
+
+@pytest.mark.parametrize("seed", [326, 342])
+def test_bodies_that_are_apart_are_not_refused(seed):
+    """Nodes behind faces of a blade that lean, though beside it, were said to lie inside it by `contacts="all"`."""
+    scene = crossing(seed).scene
+    short = dataclasses.replace(scene.impact, duration=1e-9, output_interval=1e-9)
+    assert mca.run(dataclasses.replace(scene, impact=short)).summary["extremes"]["F_n_max"] == 0.0
+
+
+@pytest.mark.parametrize(("seed", "time", "most"), [(57, 2e-5, 0.003), (274, 6e-5, 0.01)])
+def test_energy_goes_on_from_spring_to_spring(seed, time, most):
+    """Nodes that went from the edge of a blade to its face made 5 %, edges that went on over a node 7 %."""
+    scene = crossing(seed).scene
+    impact = dataclasses.replace(scene.impact, duration=time, output_interval=time / 100, energy_tolerance=1.0)
+    assert mca.run(dataclasses.replace(scene, impact=impact)).summary["energy_error"] < most
+
+
+@pytest.mark.parametrize(("place", "two_way"), [(0.0, True), (1.0, False)])
+def test_small_faces_at_the_ends_of_a_rod_do_not_make_it_a_fine_slave(place, two_way):
+    """A ball went through a rod whose nodes lay farther apart, because the least faces of both were alike."""
+    x = np.repeat([1.0, 0.0], [8, 40])[:, None] * np.ones(3)
+    rod = SimpleNamespace(area=np.repeat([1e-5, 1e-4], [8, 40]), middle=x)
+    ball = SimpleNamespace(area=np.full(24, 7e-6), middle=np.full((24, 3), place))
+    assert is_two_way(crossing(330).scene.contacts[0], rod, ball) == two_way  # type: ignore[arg-type]
 
 
 def test_plain_scenes_follow_from_their_seeds():

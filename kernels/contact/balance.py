@@ -15,3 +15,16 @@ def energy_made(s: int, force: wp.vec3d, stored: wp.float64, spent: wp.float64, 
     """
     work = wp.float64(0.5) * wp.dot(spring.force[s] + force, du)
     return stored - spring.energy[s] + spent + work
+
+
+@wp.func
+def compression_kept(stored: wp.float64, force: wp.vec3d, du: wp.vec3d, normal: wp.vec3d, k: wp.float64) -> wp.float64:
+    """Compression c [m] of a linear spring of stiffness k that takes over from another without making energy.
+
+    The other one holds `stored` [J] and gave `force` [N] before the motion du [m]; the new one acts along `normal`:
+    k c^2 / 2 + (force + k c normal) . du / 2 = stored.
+    """
+    half = wp.float64(0.5)
+    approach = -wp.dot(du, normal)
+    held = wp.max(stored - half * wp.dot(force, du), wp.float64(0.0))
+    return half * (approach + wp.sqrt(approach * approach + wp.float64(8.0) * held / k))

@@ -5,6 +5,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.contact.balance import compression_kept
 from warp_mca.kernels.contact.edge_pairs import (
     SLOTS,
     Crossing,
@@ -84,7 +85,7 @@ def predecessor(
                 if share_an_end(master, wp.max(g, 0), b):
                     pressed = spring.force[r] - spring.tangential[r]
                     if wp.dot(pressed, normal) > wp.float64(0.7) * wp.length(pressed):
-                        if not crossing(X, u, v, slave, master, other, g, wp.float64(0.0), True).touches:
+                        if not crossing(X, u, v, slave, master, other, g, wp.float64(0.0), True).within:
                             best = r
                             depth = spring.held[r]
     return best
@@ -105,7 +106,11 @@ def begin_crossing(
     """Whether a spring begins where edges a and b cross, from spring `before` or anew; its resting depth [m]."""
     size = wp.min(slave.size[a], master.size[b])
     if before >= 0:
-        return goes_on(-hit.gap, spring.held[before], hit.approach, size), spring.rest[before]
+        pressed = spring.force[before] - spring.tangential[before]
+        stored, k = spring.normal_energy[before], spring.stiffness[before]
+        kept = compression_kept(stored, pressed, hit.du, hit.normal, k)
+        rests = wp.max(-hit.gap - kept, wp.float64(0.0))
+        return goes_on(-hit.gap, spring.held[before], hit.approach, size), rests
     rest = resting_depth(-hit.gap, hit.approach, size)
     begins = rest >= wp.float64(0.0)
     if begins:

@@ -13,7 +13,7 @@ _BEGUN = 2e-3  # depth to which edges may lie in each other when their crossing 
 _MORE = 0.02  # depth by which a crossing that goes on between other edges may be deeper, as a share of an edge
 _NEAR = 0.1  # distance along an edge from a crossing within which an end may meet a face, as a share of an edge
 _CLEAR = 1e-3  # distance in front of a face at which such an end does not, as a share of an edge, at least
-_END = 0.01  # share of an edge by which a crossing that presses may lie off its ends, until another goes on
+_END, _MOST_END = 0.01, 0.5  # shares of an edge by which a crossing that presses may lie off its ends: shallow, deep
 
 
 @wp.struct
@@ -44,6 +44,7 @@ class Crossing:
 
     Attributes:
         touches: whether the edges press each other.
+        within: whether they do so between their ends.
         weight: share of each end of the slave's edge, then of the master's, in its point [-].
         normal: unit normal, out of the master.
         gap: between the points along the normal, negative where the bodies overlap [m].
@@ -52,6 +53,7 @@ class Crossing:
     """
 
     touches: wp.bool
+    within: wp.bool
     weight: wp.vec4d
     normal: wp.vec3d
     gap: wp.float64
@@ -94,7 +96,8 @@ def crossing(
 
     The normal of edges that press lies between the normals of the faces beside either of them: else an edge meets a
     face, or a neighbouring edge (S. Gottschalk, Collision queries using oriented bounding boxes, 2000; D. Gregorius,
-    The separating axis test between convex polyhedra, GDC 2013). `pressed`: whether they did so in the last step.
+    The separating axis test between convex polyhedra, GDC 2013). `pressed`: whether they did so in the last step. Then
+    they may lie off their ends by their depth, since the wedges still overlap there, until another crossing goes on.
     """
     found = Crossing()
     i = slave.node[a, 0]
@@ -115,8 +118,8 @@ def crossing(
         rb = wp.dot(across, apart)
         s = (ab * rb - bb * ra) / det
         t = (aa * rb - ab * ra) / det
-        end = wp.float64(wp.where(pressed, _END, 0.0))
-        if s >= -end and s <= one + end and t >= -end and t <= one + end:
+        off = wp.max(wp.max(-s, s - one), wp.max(-t, t - one))
+        if off <= zero or (pressed and off <= wp.float64(_MOST_END)):
             outside = wp.float64(wp.where(pressed, 2.0 * _OUTSIDE, _OUTSIDE))
             n = wp.normalize(wp.cross(along, across))
             own_first = side_normal(X, u, slave, a, 0)
@@ -126,9 +129,11 @@ def crossing(
             if wp.dot(n, first + second - own_first - own_second) < zero:
                 n = -n
             gap = wp.dot(n, apart + s * along - t * across)
-            if gap < zero and lies_between(first, second, n, outside):
+            end = wp.float64(_END) - gap / wp.sqrt(wp.min(aa, bb))
+            if gap < zero and off <= wp.max(end, zero) and lies_between(first, second, n, outside):
                 if lies_between(own_first, own_second, -n, outside):
                     found.touches = bool(True)
+                    found.within = off <= zero
                     found.weight = wp.vec4d(one - s, s, one - t, t)
                     found.normal = n
                     found.gap = gap

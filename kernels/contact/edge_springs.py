@@ -69,6 +69,8 @@ def press_kernel(friction: bool, each: bool, laws: Laws) -> Any:
             k_old = factor * wp.min(slave.stiffness[a], master.stiffness[b])
             if before == s:
                 k_old = spring.stiffness[s]
+                if met.taken[s] != wp.static(NOBODY):
+                    b = int(-1)
             elif before >= 0:
                 if met.taken[before] == s:
                     k_old = met.stiffness[s]

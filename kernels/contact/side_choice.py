@@ -5,7 +5,8 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.contact.edges import Surfaces, opposition
+from warp_mca.kernels.contact.balance import compression_kept
+from warp_mca.kernels.contact.edges import Surfaces, greatest_stiffness, opposition
 from warp_mca.kernels.contact.nearest import Nearest, edge_of
 from warp_mca.kernels.contact.projection import area_vector, is_edge
 from warp_mca.kernels.contact.settle import Touch
@@ -104,9 +105,9 @@ def springs_function(friction: bool, sides: int) -> Any:
 
 
 @cache
-def choice_functions(sides: int) -> tuple[Any, Any]:
+def choice_functions(friction: bool, sides: int) -> tuple[Any, Any]:
     """The functions (choose: the choice after one more side; confirm: how a side meets the node, given it)."""
-    way_back = way_back_function(sides)
+    way_back, pressure = way_back_function(sides), pressure_function(friction)
 
     @wp.func
     def keeper(at: Surfaces, f: int, begin: int, spring: Spring):
@@ -188,7 +189,8 @@ def choice_functions(sides: int) -> tuple[Any, Any]:
             if takes_over(at, s, near, touch.du, other, spring):
                 chosen.newcomer = e
                 chosen.leaver = other
-                chosen.begins = spring.held[other] - spring.rest[other]
+                stored, k = spring.normal_energy[other], greatest_stiffness(at, s, near.face)
+                chosen.begins = compression_kept(stored, pressure(other, spring), touch.du, near.normal, k)
         return chosen
 
     @wp.func

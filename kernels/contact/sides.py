@@ -39,7 +39,7 @@ def sided_kernel(friction: bool, each: bool, sides: int, laws: Laws = PLAIN, slo
     among them; step 1 presses the node. Each of the `slots` bodies that a node may touch at once has its own springs.
     """
     settle, _ = settle_functions(friction, laws)
-    choose, confirm = choice_functions(sides)
+    choose, confirm = choice_functions(friction, sides)
     pressure, springs_of_node = pressure_function(friction), springs_function(friction, sides)
     front_faces, may_press = front_functions(sides)
     release = release_function(friction, sides, laws)

@@ -12,7 +12,8 @@ from warp_mca.model.model import Model
 from warp_mca.scene import Scene
 from warp_mca.step.steps import Steps
 
-# Speeds may grow this many times over the initial one before a node can outrun the contact search between two passes.
+# Speeds may grow to so many times that of the fastest node, or that at which nodes approach each other, before one can
+# outrun the contact search between two passes.
 SPEED_RESERVE = 4.0
 MOST_INTERVALS = 4  # of output between two searches: bodies that rest or are slow at first are pushed by contact later
 MAX_ROWS = 10_000_000  # of a history: some 5 GB
@@ -94,6 +95,7 @@ def _limits(scene: Scene, model: Model, interval: float, intervals: int) -> tupl
         raise bad_value("Body.position", far, f"this far from the origin, {lost}; move the scene closer to the origin")
     with np.errstate(over="ignore"):
         apart = float(np.ptp(model.V, axis=0).max()) * stable
+        fastest = max(fastest, float(np.linalg.norm(np.ptp(model.V, axis=0))))
     if apart > float(np.ptp(model.X, axis=0).max()):
         remedy = f"in a step some nodes would move {apart:.3g} m more than others; check the unit [m/s or rad/s]"
         raise bad_value("speed of the bodies", speed, remedy)

@@ -152,16 +152,23 @@ def _outside(
 ) -> NDArray[np.bool_]:
     """Springs whose node lies outside of closed masters, though behind the plane of a face that leans."""
     found, least = depth > 0.0, _rounding(stage, scene, solver)
-    for body, nodes in {(master.body, master.nodes) for _, master in _surfaces(ready, stage.items[scene])}:
-        mesh, first = ready.meshes[body], int(solver.layout.nodes[scene]) + ready.model.node_start[body]
+    for slave, master in _surfaces(ready, stage.items[scene]):
+        mesh, first = ready.meshes[master.body], _first(slave.body, ready, scene, solver)
+        mine = found & (slaves >= first) & (slaves < first + len(ready.meshes[slave.body].points))
+        if not mine.any():
+            continue
         skin = mesh.boundary[0]
-        if len(mesh.surface(nodes)[0]) != len(skin):  # an open surface does not tell inside from outside
+        if len(mesh.surface(master.nodes)[0]) != len(skin):  # an open surface does not tell inside from outside
             return np.zeros(len(depth), dtype=bool)
+        first = _first(master.body, ready, scene, solver)
         x = solver.model.X[first : first + len(mesh.points)]
-        found[found] = depths_below(solver.model.X[slaves[found]], x, triangulated(skin)) < -least
-        if not found.any():
-            break
+        found[mine] = depths_below(solver.model.X[slaves[mine]], x, triangulated(skin)) < -least
     return found
+
+
+def _first(body: str, ready: Prepared, scene: int, solver: Solver) -> int:
+    """First node of a body of a scene."""
+    return int(solver.layout.nodes[scene]) + ready.model.node_start[body]
 
 
 def _or_behind(
@@ -170,7 +177,7 @@ def _or_behind(
     """What was found, named "behind" if none of the pressed nodes lies in the master's body."""
     points = solver.model.X[np.unique(nodes)]
     for name in {master.body for _, master in _surfaces(ready, stage.items[scene])}:
-        first = int(solver.layout.nodes[scene]) + ready.model.node_start[name]
+        first = _first(name, ready, scene, solver)
         mesh = ready.meshes[name]
         body = solver.model.X[first : first + len(mesh.points)]
         inside = depths_below(points, body, triangulated(mesh.boundary[0]))

@@ -60,7 +60,7 @@ def driven_into_a_plane(c: Finished, _: float) -> Iterator[Values]:
     "nodes of {slave} sank {depth:.3g} m deep into {master}, which is {thickness:.3g} m thick: contact springs are too "
     "soft for a body so thin;",
     "raise penalty, or give both bodies smaller cells",
-    0.25,
+    0.1,
     "of the thickness at most",
 )
 def deep_in_a_thin_body(c: Finished, most: float) -> Iterator[Values]:

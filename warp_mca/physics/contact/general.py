@@ -53,7 +53,7 @@ def general_passes(
     folds = [bool(factor[k, k]) for k in range(len(names))]
     offset, barred = _barred(parts.X, union, item, np.array(folds)[face_of])
     body, faces = slave_of[order].astype(np.int32), face_of.astype(np.int32)
-    room = min(2 * item.room, LONGEST_LIST) if any(folds) else item.room  # folds crush cells
+    room = max(item.room, min(2 * item.room, LONGEST_LIST)) if any(folds) else item.room  # folds crush cells
     found = Pairs(body=body, face=faces, factor=factor, barred_offset=offset, barred=barred)
     item = replace(item, room=room, pairs=found)
     added = _eigenvalues(parts.mass, item, union)

@@ -12,11 +12,12 @@ from warp_mca.base.arrays import Array, Index
 from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.kernels.contact.edge_pairs import SLOTS
 from warp_mca.physics.contact.sides import SHARP, neighbours
-from warp_mca.physics.contact.stiffness import Inertia, edge_stiffness
+from warp_mca.physics.contact.stiffness import Inertia, edge_stiffness, nearest_faces
 from warp_mca.physics.contact.surfaces import ContactPass, Faces
 from warp_mca.scene import Contact
 
 BLUNT = math.radians(3.0)  # angle between the faces beside an edge from which on it may press another
+TENTH = 0.1  # of the area of a surface that has faces as small as those by which it is judged
 WIDER = 1.5  # ratio of widths of the slave's and the master's faces from which on the master's nodes could pass unseen
 COARSE = 0.5  # length of an edge that nodes see pass, as a share of the radius of what passes, at most
 
@@ -61,14 +62,23 @@ def skin_edges(X: Array, faces: Faces) -> SkinEdges:
 
 
 def is_two_way(contact: Contact, slave: Faces, master: Faces | None) -> bool:
-    """Whether the master's nodes are kept out of the slave's faces, too: as the contact says, else if these are wider.
+    """Whether the master's nodes are kept out of the slave's faces, too: as the contact says, or if these are wider.
 
-    That is the lesser of the ratio of the smallest and that of the usual: faces far from contact may be of any size.
+    They are so on most of the surfaces, and where these are nearest to each other: faces far from contact may be of any
+    size.
     """
     if contact.two_way is not None or contact.bond or master is None:
         return bool(contact.two_way)
-    ratio = min(slave.area.min() / master.area.min(), np.median(slave.area) / np.median(master.area))
-    return bool(math.sqrt(ratio) > WIDER)
+    mine, its = nearest_faces(contact, slave, master)
+    local = math.sqrt(slave.area[mine] / master.area[its])
+    return min(local, _width(slave.area) / _width(master.area)) > WIDER
+
+
+def _width(area: Array) -> float:
+    """Width of the faces that a TENTH of a surface is smaller than [m]: those of the ends of a rod may be tiny."""
+    area = np.sort(area)
+    covered = np.cumsum(area)
+    return math.sqrt(area[np.searchsorted(covered, TENTH * covered[-1])])
 
 
 @joinable

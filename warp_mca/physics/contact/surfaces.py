@@ -23,7 +23,7 @@ Index = NDArray[np.int32]
 
 SEARCH_MARGIN = 0.25  # margin of the search for faces, as a share of the edge of the smallest face
 LIST_LENGTH = 32  # faces near a slave node, and slave nodes near a face at least; a full list stops the run
-LONGEST_LIST = 4096  # slave nodes near a face at most
+LONGEST_LIST, ENTRIES = 4096, 2**24  # slave nodes near a face at most; more if all lists have no more entries than so
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,7 @@ class Faces:
         area: [m^2], shape (face_count,), float64.
         normal: outwards, as long as the area [m^2], shape (face_count, 3), float64.
         middle: mean of the corners [m], shape (face_count, 3), float64.
+        across: length of the longest diagonal or edge [m], shape (face_count,), float64.
         bulk: K A^2 / V of each face [N/m], shape (face_count,), float64.
         contact: E* A^2 / V of each face, with E* = E / (1 - nu^2) [N/m], shape (face_count,), float64.
         layer: E* A / d of each face, with the height d of its cell over it [N/m], shape (face_count,), float64.
@@ -47,6 +48,7 @@ class Faces:
     area: Array
     normal: Array
     middle: Array
+    across: Array
     bulk: Array
     contact: Array
     layer: Array
@@ -161,22 +163,23 @@ def make_faces(
     area, normal = face_geometry(X, face)
     K, G, volume = K[element], G[element], volume[element]
     contact = 4.0 * G * (3.0 * K + G) / (3.0 * K + 4.0 * G)  # E / (1 - nu^2)
-    middle = X[face].mean(axis=1)
+    corner = X[face]
+    middle, across = corner.mean(axis=1), np.linalg.norm(corner[:, :, None] - corner[:, None], axis=3).max(axis=(1, 2))
     bulk, own = K * area**2 / volume, contact * area**2 / volume
-    return Faces(face, element, area, normal, middle, bulk, own, own if height is None else own / height[element])
+    return Faces(
+        face, element, area, normal, middle, across, bulk, own, own if height is None else own / height[element]
+    )
 
 
 def _room(slave: Faces, master: Faces, margin: float) -> int:
-    """Slave nodes that the list of a face has to hold: as many as lie within `margin` around the largest, and as many
-    again where that face lies aslant to its box or an edge of the slave reaches in; a multiple of LIST_LENGTH."""
+    """Slave nodes that the list of a face holds; a multiple of LIST_LENGTH.
 
-    def cell(faces: Faces) -> Array:  # area for each node of a grid; the box around a triangle has twice its area
-        return np.where(is_triangle(faces.node), 2.0, 1.0) * faces.area
-
-    side = float(np.sqrt(cell(master).max())) + 2.0 * margin
-    spacing = float(np.sqrt(node_mean(slave.nodes, slave, cell(slave)).min()))
-    most = 2.0 * (side / spacing + 1.0) ** 2
-    return min(LIST_LENGTH * math.ceil(most / LIST_LENGTH), LONGEST_LIST)
+    Its box is about as wide as the face is across if it lies aslant, and three sides of the slave meet in a corner.
+    """
+    cell = np.where(is_triangle(slave.node), 2.0, 1.0) * slave.area  # area for each node of a grid
+    spacing = float(np.sqrt(node_mean(slave.nodes, slave, cell).min()))
+    most = min(3.0 * ((master.across.max() + 2.0 * margin) / spacing + 1.0) ** 2, len(slave.nodes))
+    return min(LIST_LENGTH * math.ceil(most / LIST_LENGTH), max(LONGEST_LIST, ENTRIES // len(master.node)))
 
 
 def _faces_around(nodes: Index, face: Index) -> tuple[Index, Index]:
