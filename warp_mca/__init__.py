@@ -43,7 +43,8 @@ from warp_mca.scene import (
     Tip,
     Weld,
 )
-from warp_mca.scene.materials import Elastic, J2Bilinear
+from warp_mca.scene.elastic import Elastic
+from warp_mca.scene.metals import Chaboche, CowperSymonds, J2Bilinear, J2Table, J2Voce, JohnsonCook
 
 if TYPE_CHECKING:
     from warp_mca.accuracy.request import Accuracy
@@ -93,6 +94,11 @@ __all__ = [
     "Body",
     "Elastic",
     "J2Bilinear",
+    "J2Voce",
+    "J2Table",
+    "CowperSymonds",
+    "JohnsonCook",
+    "Chaboche",
     "Contact",
     "ContactAll",
     "Penalty",
