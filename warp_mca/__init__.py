@@ -42,6 +42,7 @@ from warp_mca.scene import (
     Tie,
     Tip,
     Weld,
+    library,
 )
 from warp_mca.scene.elastic import Elastic
 from warp_mca.scene.metals import Chaboche, CowperSymonds, J2Bilinear, J2Table, J2Voce, JohnsonCook
@@ -99,6 +100,7 @@ __all__ = [
     "CowperSymonds",
     "JohnsonCook",
     "Chaboche",
+    "library",
     "Contact",
     "ContactAll",
     "Penalty",
