@@ -183,7 +183,7 @@ def metal_laws(setup: Setup) -> list[Row]:
     """One element; strain up to 1 % at small strain, 4 % at finite strain, and shear up to twice sqrt(3) of that."""
     rows, small = [], ("cyclic", "corotational")
     courses = setup.choose((small,), (small, ("shear", "corotational"), ("turned", "finite")))
-    names = setup.choose(("table", "Cowper-Symonds", "Chaboche"), tuple(METALS))
+    names = setup.choose(("Cowper-Symonds", "Chaboche"), tuple(METALS))
     for course, kinematics in courses:
         for name, metal in ((name, METALS[name]) for name in names):
             scene = driven_element(metal, course, 1e-3, kinematics)
