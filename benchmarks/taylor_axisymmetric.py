@@ -22,9 +22,84 @@ Gradient = tuple[Array, ...]
 
 LENGTH, RADIUS, SPEED, DURATION = 32.4e-3, 3.2e-3, 227.0, 80e-6
 E, NU, RHO, YIELD, E_T = 117e9, 0.35, 8930.0, 400e6, 100e6
-K, G, H = E / (3.0 - 6.0 * NU), E / (2.0 + 2.0 * NU), E * E_T / (E - E_T)
-SPEED_OF_SOUND = ((K + 4.0 / 3.0 * G) / RHO) ** 0.5
 _CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+
+
+@dataclass
+class Metal:
+    """Bilinear hardening. Laws with rates read `dt`, the step [s], and keep what they need.
+
+    Attributes:
+        length, radius, speed, duration: of the bar and its impact [m], [m/s], [s].
+        E, nu, rho: [Pa], [-], [kg/m^3].
+    """
+
+    length: float = LENGTH
+    radius: float = RADIUS
+    speed: float = SPEED
+    duration: float = DURATION
+    E: float = E
+    nu: float = NU
+    rho: float = RHO
+    dt: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.K, self.G = self.E / (3.0 - 6.0 * self.nu), self.E / (2.0 + 2.0 * self.nu)
+        self.sound = ((self.K + 4.0 / 3.0 * self.G) / self.rho) ** 0.5
+
+    def growth(self, size: Array, p: Array) -> Array:
+        """Of the equivalent plastic strain p, where a trial stress has this size [Pa]."""
+        H = E * E_T / (E - E_T)
+        return np.maximum(size - YIELD - H * p, 0.0) / (3.0 * self.G + H)
+
+
+@dataclass
+class JohnsonCook(Metal):
+    """Their flow stress with adiabatic heating; parameters as in `warp_mca.JohnsonCook`, which starts at T_room."""
+
+    A: float = 90e6
+    B: float = 292e6
+    n: float = 0.31
+    C: float = 0.025
+    m: float = 1.09
+    span: float = 1063.0
+    c_p: float = 383.0
+    beta: float = 0.9
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.work: Array = np.zeros(1)
+
+    def strength(self, p: Array, dp: Array, work: Array) -> Array:
+        """Flow stress [Pa] at the end of a step."""
+        hot = np.minimum(self.beta * work / (self.rho * self.c_p * self.span), 1.0)
+        fast = 1.0 + self.C * np.log(np.maximum(dp / self.dt, 1.0))
+        return (self.A + self.B * p**self.n) * fast * (1.0 - hot**self.m)
+
+    def growth(self, size: Array, p: Array) -> Array:
+        """By the secant rule of Illinois, within brackets."""
+        self.work = np.broadcast_to(self.work, p.shape).copy()
+        dp, at = np.zeros_like(p), np.flatnonzero(size > self.strength(p, np.zeros_like(p), self.work))
+        if not len(at):
+            return dp
+        q, old, work = size.flat[at], p.flat[at], self.work.flat[at]
+
+        def left(x: Array) -> Array:
+            return 3.0 * self.G * x + self.strength(old + x, x, work) - q
+
+        a, b = np.zeros_like(q), q / (3.0 * self.G)
+        fa, fb = left(a), left(b)
+        for _ in range(60):
+            x = (a * fb - b * fa) / (fb - fa)
+            f = left(x)
+            if np.abs(f).max() < 1e-8 * q.max():
+                break
+            other = f * fb < 0.0
+            a, fa = np.where(other, b, a), np.where(other, fb, 0.5 * fa)
+            b, fb = x, f
+        dp.flat[at] = x
+        self.work.flat[at] += (q - 3.0 * self.G * x) * x
+        return dp
 
 
 @dataclass(frozen=True)
@@ -45,9 +120,11 @@ class Mesh:
     mass: Array
 
 
-def make_mesh(across: int, along: int) -> Mesh:
+def make_mesh(across: int, along: int, metal: Metal) -> Mesh:
     """Equal rectangles; the wall is z = 0."""
-    z, r = np.meshgrid(np.linspace(0.0, LENGTH, along + 1), np.linspace(0.0, RADIUS, across + 1), indexing="ij")
+    z, r = np.meshgrid(
+        np.linspace(0.0, metal.length, along + 1), np.linspace(0.0, metal.radius, across + 1), indexing="ij"
+    )
     X = np.column_stack([r.ravel(), z.ravel()])
     index = np.arange(len(X)).reshape(along + 1, across + 1)
     conn = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1).reshape(-1, 4)
@@ -57,7 +134,7 @@ def make_mesh(across: int, along: int) -> Mesh:
     jacobian = np.einsum("gak,eai->egik", slope, X[conn])
     R = X[conn][..., 0] @ shape.T
     weight = 2.0 * np.pi * R * np.linalg.det(jacobian)
-    mass = np.bincount(conn.ravel(), (RHO * weight @ shape).ravel(), len(X))
+    mass = np.bincount(conn.ravel(), (metal.rho * weight @ shape).ravel(), len(X))
     b = np.einsum("gak,egki->egai", slope, np.linalg.inv(jacobian))
     return Mesh(X, conn, b, shape / R[..., None], weight, mass)
 
@@ -69,11 +146,11 @@ def gradient(mesh: Mesh, x: Array) -> Gradient:
     return F[..., 0, 0], F[..., 0, 1], F[..., 1, 0], F[..., 1, 1], around
 
 
-def plastic_step(s: Symmetric, p: Array) -> tuple[Array, Array]:
+def plastic_step(s: Symmetric, p: Array, metal: Metal) -> tuple[Array, Array]:
     """Radial return: what a trial deviator shrinks by, and the growth of the equivalent plastic strain."""
     size = np.sqrt(1.5 * (s[0] ** 2 + s[1] ** 2 + 2.0 * s[2] ** 2 + s[3] ** 2))
-    dp = np.maximum(size - YIELD - H * p, 0.0) / (3.0 * G + H)
-    return 1.0 - 3.0 * G * dp / np.maximum(size, 1.0), dp
+    dp = metal.growth(size, p)
+    return 1.0 - 3.0 * metal.G * dp / np.maximum(size, 1.0), dp
 
 
 def push(a: Array, b: Array, c: Array, d: Array, s: Symmetric, around: Array) -> Symmetric:
@@ -83,16 +160,18 @@ def push(a: Array, b: Array, c: Array, d: Array, s: Symmetric, around: Array) ->
     return ar * a + az * b, cr * c + cz * d, ar * c + az * d, around * s[3] * around
 
 
-def multiplicative(state: Symmetric, F: Gradient, before: Gradient, p: Array) -> tuple[Symmetric, Symmetric, Array]:
+def multiplicative(
+    state: Symmetric, F: Gradient, before: Gradient, p: Array, metal: Metal
+) -> tuple[Symmetric, Symmetric, Array]:
     """Deviatoric Kirchhoff stress [Pa]; the state is the inverse of C_p."""
     rr, rz, zr, zz, around = F
     values, c, s = principal(push(rr, rz, zr, zz, state, around))
     strain = [0.5 * np.log(value) for value in values]
     mean = sum(strain) / 3.0
-    trial = [2.0 * G * (e - mean) for e in strain]
-    kept, dp = plastic_step((trial[0], trial[1], np.zeros_like(p), trial[2]), p)
+    trial = [2.0 * metal.G * (e - mean) for e in strain]
+    kept, dp = plastic_step((trial[0], trial[1], np.zeros_like(p), trial[2]), p, metal)
     tau = [kept * value for value in trial]
-    elastic = [np.exp(value / G + 2.0 * mean) for value in tau]
+    elastic = [np.exp(value / metal.G + 2.0 * mean) for value in tau]
     J = rr * zz - rz * zr
     state = push(zz / J, -rz / J, -zr / J, rr / J, _turned(elastic, c, s), 1.0 / around)
     return _turned(tau, c, s), state, p + dp
@@ -110,7 +189,9 @@ def _turned(value: list[Array], c: Array, s: Array) -> Symmetric:
     return first * c * c + second * s * s, first * s * s + second * c * c, (first - second) * c * s, around
 
 
-def additive(state: Symmetric, F: Gradient, before: Gradient, p: Array) -> tuple[Symmetric, Symmetric, Array]:
+def additive(
+    state: Symmetric, F: Gradient, before: Gradient, p: Array, metal: Metal
+) -> tuple[Symmetric, Symmetric, Array]:
     """Deviatoric Kirchhoff stress [Pa]; the state is the plastic strain."""
     rr, rz, zr, zz, around = F
     one, none = np.ones_like(p), np.zeros_like(p)
@@ -118,10 +199,10 @@ def additive(state: Symmetric, F: Gradient, before: Gradient, p: Array) -> tuple
     strain = [0.5 * np.log(value) for value in values]
     mean = sum(strain) / 3.0
     e = _turned([value - mean for value in strain], c, s)
-    trial = tuple(2.0 * G * (a - b) for a, b in zip(e, state, strict=True))
-    kept, dp = plastic_step(trial, p)
+    trial = tuple(2.0 * metal.G * (a - b) for a, b in zip(e, state, strict=True))
+    kept, dp = plastic_step(trial, p, metal)
     T = tuple(kept * value for value in trial)
-    state = tuple(a - b / (2.0 * G) for a, b in zip(e, T, strict=True))
+    state = tuple(a - b / (2.0 * metal.G) for a, b in zip(e, T, strict=True))
     first, second, last = values
     gap = np.maximum((first - second) / second, 1e-12)
     T = push(c, s, -s, c, T, one)
@@ -129,7 +210,9 @@ def additive(state: Symmetric, F: Gradient, before: Gradient, p: Array) -> tuple
     return push(rr, rz, zr, zz, push(c, -s, s, c, T, one), around), state, p + dp
 
 
-def hypoelastic(state: Symmetric, F: Gradient, before: Gradient, p: Array) -> tuple[Symmetric, Symmetric, Array]:
+def hypoelastic(
+    state: Symmetric, F: Gradient, before: Gradient, p: Array, metal: Metal
+) -> tuple[Symmetric, Symmetric, Array]:
     """Deviatoric Kirchhoff stress [Pa]; the state is the deviator of Cauchy's."""
     rr, rz, zr, zz, around = (0.5 * (new + old) for new, old in zip(F, before, strict=True))
     d = [new - old for new, old in zip(F, before, strict=True)]
@@ -141,8 +224,8 @@ def hypoelastic(state: Symmetric, F: Gradient, before: Gradient, p: Array) -> tu
     c, s = np.cos(angle), np.sin(angle)
     turned = push(c, -s, s, c, state, np.ones_like(p))
     step = (L[0] - mean, L[3] - mean, 0.5 * (L[1] + L[2]), L[4] - mean)
-    trial = tuple(value + 2.0 * G * e for value, e in zip(turned, step, strict=True))
-    kept, dp = plastic_step(trial, p)
+    trial = tuple(value + 2.0 * metal.G * e for value, e in zip(turned, step, strict=True))
+    kept, dp = plastic_step(trial, p, metal)
     sigma = tuple(kept * value for value in trial)
     volume = (F[0] * F[3] - F[1] * F[2]) * F[4]
     return tuple(volume * value for value in sigma), sigma, p + dp
@@ -151,12 +234,12 @@ def hypoelastic(state: Symmetric, F: Gradient, before: Gradient, p: Array) -> tu
 LAWS = {"multiplicative": multiplicative, "hypoelastic": hypoelastic, "additive": additive}
 
 
-def forces(mesh: Mesh, F: Gradient, tau: Symmetric) -> Array:
+def forces(mesh: Mesh, F: Gradient, tau: Symmetric, metal: Metal) -> Array:
     """On the nodes [N], shape (node_count, 2), with the pressure K ln J / J of an element's mean J."""
     rr, rz, zr, zz, around = F
     plane = rr * zz - rz * zr
     J = (mesh.weight * plane * around).sum(axis=1) / mesh.weight.sum(axis=1)
-    p = (K * np.log(J) / J)[:, None] * plane * around
+    p = (metal.K * np.log(J) / J)[:, None] * plane * around
     inverse = zz / plane, -rz / plane, -zr / plane, rr / plane
     rows = (tau[0] + p, tau[2]), (tau[2], tau[1] + p)
     P = [[a * inverse[0] + b * inverse[1], a * inverse[2] + b * inverse[3]] for a, b in rows]
@@ -165,30 +248,33 @@ def forces(mesh: Mesh, F: Gradient, tau: Symmetric) -> Array:
     return np.column_stack([-np.bincount(mesh.conn.ravel(), part.ravel(), len(mesh.X)) for part in f])
 
 
-def stable_step(mesh: Mesh, x: Array) -> float:
+def stable_step(mesh: Mesh, x: Array, metal: Metal) -> float:
     """Smallest area over longest side, over the speed of sound [s]."""
     corners = x[mesh.conn]
     one, two = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
     area = 0.5 * np.abs(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0])
     longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
-    return float((area / longest).min()) / SPEED_OF_SOUND
+    return float((area / longest).min()) / metal.sound
 
 
-def bar(across: int, along: int, law: str, held: bool, share: float = 0.6) -> tuple[float, float]:
-    """Length, and radius of the foot [m], after 80 us. `held`: nodes of the foot stay on the wall."""
-    mesh = make_mesh(across, along)
+def bar(
+    across: int, along: int, law: str, held: bool, share: float = 0.6, metal: Metal | None = None
+) -> tuple[float, float]:
+    """Length, and radius of the foot [m], at the end. `held`: nodes of the foot stay on the wall."""
+    metal = metal or Metal()
+    mesh = make_mesh(across, along, metal)
     stress = LAWS[law]
     x, v, zero = mesh.X.copy(), np.zeros_like(mesh.X), np.zeros_like(mesh.weight)
-    v[:, 1] = -SPEED
+    v[:, 1] = -metal.speed
     foot, axis = mesh.X[:, 1] == 0.0, mesh.X[:, 0] == 0.0
     start = 1.0 if law == "multiplicative" else 0.0
     state: Symmetric = (zero + start, zero + start, zero, zero + start)
     p, time, F = zero, 0.0, gradient(mesh, x)
-    while time < DURATION:
-        dt = min(share * stable_step(mesh, x), DURATION - time + 1e-15)
+    while time < metal.duration:
+        dt = metal.dt = min(share * stable_step(mesh, x, metal), metal.duration - time + 1e-15)
         before, F = F, gradient(mesh, x)
-        tau, state, p = stress(state, F, before, p)
-        v += dt * forces(mesh, F, tau) / mesh.mass[:, None]
+        tau, state, p = stress(state, F, before, p, metal)
+        v += dt * forces(mesh, F, tau, metal) / mesh.mass[:, None]
         v[axis, 0] = 0.0
         touches = foot & (held | (x[:, 1] + dt * v[:, 1] < 0.0))
         v[touches, 1] = -x[touches, 1] / dt

@@ -165,7 +165,9 @@ def test_what_is_not_registered_is_refused():
     class Softer(Voce):
         pass
 
-    with pytest.raises(RequestError, match=r"give an Elastic or a J2Bilinear or a Voce, or .* by warp_mca.register"):
+    with pytest.raises(
+        RequestError, match=r"give an Elastic or a J2Bilinear or .* or a Voce, or .* by warp_mca.register"
+    ):
         bars(own=Softer(**vars(VOCE)))
 
 

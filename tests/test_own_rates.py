@@ -98,7 +98,7 @@ def energies(precision: str) -> Any:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CowperSymonds(mca.Elastic):
+class OwnRates(mca.Elastic):
     """Yield stress sigma_y [Pa] at rest; at the rate D [1/s] of the plastic strain it is twice that."""
 
     sigma_y: float
@@ -112,7 +112,7 @@ class CowperSymonds(mca.Elastic):
         return *super().parameters, self.sigma_y, self.D, self.q
 
 
-STEEL = CowperSymonds(E=210e9, nu=0.3, rho=7850.0, sigma_y=250e6, D=40.0, q=5.0)  # mild steel
+STEEL = OwnRates(E=210e9, nu=0.3, rho=7850.0, sigma_y=250e6, D=40.0, q=5.0)  # mild steel
 DEVICES = ["cpu", pytest.param("cuda:0", marks=pytest.mark.gpu)]
 ELEMENTS = ["hex8", "hex8r", "linear_tet"]
 
@@ -120,7 +120,7 @@ ELEMENTS = ["hex8", "hex8r", "linear_tet"]
 @pytest.fixture(autouse=True)
 def registered(register: Callable[..., object]) -> None:
     """The one registration."""
-    register(CowperSymonds)
+    register(OwnRates)
 
 
 def sheared(rate: float, element: str = "hex8", kinematics: str = "corotational") -> mca.Scene:
@@ -156,13 +156,13 @@ def test_the_flow_stress_in_simple_shear_is_that_of_the_rate(rate: float, device
         assert result.summary["energy_error"] < 1e-4
 
 
-def striking(element: str) -> mca.Scene:
+def striking(element: str, material: mca.Elastic | None = None) -> mca.Scene:
     """A bar flies along x against a rigid block and flows where it strikes it; its cells grow along x."""
     box = mca.Box(size=(0.02, 0.005, 0.005), divisions=(6, 2, 2)).build()
     x = box.points[:, 0] / 0.02
     box.points[:, 0] = 0.02 * (1.0 - (1.0 - x) ** 2)
     block = mca.Box(size=(0.01, 0.01, 0.01), divisions=(2, 2, 2), origin=(0.02, -0.0025, -0.0025))
-    bar = {"geometry": box, "material": STEEL, "element": element, "velocity": (20.0, 0.0, 0.0)}
+    bar = {"geometry": box, "material": material or STEEL, "element": element, "velocity": (20.0, 0.0, 0.0)}
     return mca.Scene(
         name="striking",
         bodies=(

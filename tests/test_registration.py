@@ -99,7 +99,7 @@ def test_each_kind_gets_into_its_table():
 
 def test_another_thing_of_the_same_name_is_refused():
     taken = type("Elastic", (mca.Elastic,), {"__module__": "mine"})
-    words = r"^register: name of the material = 'Elastic': warp_mca\.scene\.materials\.Elastic has this name; give mine"
+    words = r"^register: name of the material = 'Elastic': warp_mca\.scene\.elastic\.Elastic has this name; give mine"
     with pytest.raises(RequestError, match=words):
         mca.register(taken)
     assert MATERIALS["Elastic"] is mca.Elastic

@@ -43,8 +43,10 @@ from warp_mca.scene import (
     Tie,
     Tip,
     Weld,
+    library,
 )
-from warp_mca.scene.materials import Elastic, J2Bilinear
+from warp_mca.scene.elastic import Elastic
+from warp_mca.scene.metals import Chaboche, CowperSymonds, J2Bilinear, J2Table, J2Voce, JohnsonCook
 
 if TYPE_CHECKING:
     from warp_mca.accuracy.request import Accuracy
@@ -95,6 +97,12 @@ __all__ = [
     "Bond",
     "Elastic",
     "J2Bilinear",
+    "J2Voce",
+    "J2Table",
+    "CowperSymonds",
+    "JohnsonCook",
+    "Chaboche",
+    "library",
     "Contact",
     "ContactAll",
     "Penalty",

@@ -107,19 +107,19 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "bulk_modulus_low": Mutation(
         "the bulk modulus is E / (3 (1 - nu)) in place of E / (3 (1 - 2 nu))",
-        "warp_mca/scene/materials.py",
+        "warp_mca/scene/elastic.py",
         "return self.E / (3.0 * (1.0 - 2.0 * self.nu))",
         "return self.E / (3.0 * (1.0 - self.nu))",
     ),
     "hardening_is_tangent": Mutation(
         "the tangent modulus E_t is taken for the hardening modulus E E_t / (E - E_t)",
-        "warp_mca/scene/materials.py",
+        "warp_mca/scene/metals.py",
         "return self.E * self.E_t / (self.E - self.E_t)",
         "return self.E_t",
     ),
     "shear_modulus_low": Mutation(
         "the shear modulus is E / (2 (1 + 2 nu)) in place of E / (2 (1 + nu))",
-        "warp_mca/scene/materials.py",
+        "warp_mca/scene/elastic.py",
         "return self.E / (2.0 * (1.0 + self.nu))",
         "return self.E / (2.0 * (1.0 + 2.0 * self.nu))",
     ),
@@ -280,7 +280,7 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "beta_swapped": Mutation(
         "isotropic and kinematic hardening are swapped: 1 - beta is taken for beta",
-        "warp_mca/scene/materials.py",
+        "warp_mca/scene/metals.py",
         "self.hardening_modulus, self.beta",
         "self.hardening_modulus, 1.0 - self.beta",
     ),

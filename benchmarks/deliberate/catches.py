@@ -35,6 +35,7 @@ CATCHES: dict[str, tuple[str, ...]] = {
     "plastic_dissipation": ("isotropic_work_high", "beta_swapped"),
     "tension_torsion": ("back_stress_high", "stress_not_turned", "shear_modulus_doubled"),
     "yield_surface": ("return_too_short",),
+    "metal_laws": ("rate_halved", "back_stress_never_fades"),
     "large_tension_torsion": ("finite_shear_unscaled", "finite_pressure_unscaled", "logarithmic_strain_doubled"),
     "bar_wave": ("bulk_modulus_low", "elastic_shear_soft"),
     "plastic_wave": ("hardening_is_tangent",),

@@ -59,4 +59,18 @@ ELEMENT_MUTATIONS: dict[str, Mutation] = {
         "P",
         element="tet4",
     ),
+    "rate_halved": Mutation(
+        "Cowper and Symonds' law takes half the rate of the plastic strain",
+        "kernels/materials/cowper_symonds.py",
+        "wp.pow(dp / (dt * c.law",
+        "wp.pow(R(0.5) * dp / (dt * c.law",
+        element="tet4",
+    ),
+    "back_stress_never_fades": Mutation(
+        "the first back stress of Chaboche's law grows without its recall",
+        "kernels/materials/chaboche.py",
+        "Y1 = one * (X1",
+        "Y1 = (X1",
+        element="tet4",
+    ),
 }

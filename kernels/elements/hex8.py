@@ -38,7 +38,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False, viscous: b
     Every plastic element takes the return map, which suits a CPU that computes several elements side by side; a GPU
     runs `kernels.elements.hex8_patch`.
     """
-    if finite or law_functions(law_name, precision).general:
+    if finite or law_functions(law_name, precision).by_points:
         return points_force_kernel(precision, law_name, finite, viscous)
     t = scalars(precision)
     R, vec3 = t.real, t.vec3

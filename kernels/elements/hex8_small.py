@@ -16,7 +16,7 @@ from warp_mca.kernels.elements.hexahedron import (
 )
 from warp_mca.kernels.elements.viscosity import viscosity_function
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
-from warp_mca.kernels.materials.point import flow_function
+from warp_mca.kernels.materials.flow import flow_function
 
 wp.set_module_options({"enable_backward": False})
 

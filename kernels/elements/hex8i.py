@@ -27,7 +27,7 @@ wp.set_module_options({"enable_backward": False})
 
 def keeps_vectors(law: Law, finite: bool) -> bool:
     """Whether the internal vectors are part of the history: where they have no closed form."""
-    return finite or law.general
+    return finite or law.by_points
 
 
 def lags(law: Law, finite: bool) -> bool:

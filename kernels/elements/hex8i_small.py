@@ -7,7 +7,7 @@ import warp as wp
 
 from warp_mca.kernels.elements.internal_modes import FOUR_THIRDS, LEAST, PLANE, layers, mode_functions, place_functions
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
-from warp_mca.kernels.materials.point import flow_function, history_functions
+from warp_mca.kernels.materials.flow import flow_function, history_functions
 
 wp.set_module_options({"enable_backward": False})
 

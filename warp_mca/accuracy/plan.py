@@ -22,7 +22,7 @@ from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.base.log import LOGGER
 from warp_mca.phases.rate_groups import cost_of
 from warp_mca.scene import Scene
-from warp_mca.scene.materials import Elastic, J2Bilinear
+from warp_mca.scene.materials import Elastic
 
 if TYPE_CHECKING:
     from warp_mca.results.result import Result
@@ -211,7 +211,7 @@ def _check(scene: Scene, asked: Accuracy, finished_meshes: bool) -> None:
 
 
 def _without_strain(scene: Scene) -> Mapping[str, str]:
-    yields = any(isinstance(item, J2Bilinear) for body in scene.bodies for item in _materials(body.material))
+    yields = any(bool(item.law) for body in scene.bodies for item in _materials(body.material))
     return {"max_plastic_strain": STRAIN if yields else "no body yields"}
 
 

@@ -22,6 +22,7 @@ FILES = (
     "vibration",
     "material",
     "large_strain",
+    "metals",
     "waves",
     "absorbing",
     "tied",

@@ -15,7 +15,7 @@ from warp_mca.verify.material import NU, SIGMA_Y, SIZE, E, imposed_course, integ
 STRAIN = 0.08  # greatest axial strain [-]
 
 
-def _slope_of_log(C: Array, T: Array) -> Array:
+def slope_of_log(C: Array, T: Array) -> Array:
     """Derivative of the logarithm at C in the direction T, shape (3, 3): the corner of a matrix of twice the size."""
     from scipy.linalg import logm
 
@@ -44,7 +44,7 @@ def _exact_course(F: Array, time: Array, beta: float, every: int) -> tuple[Array
     work = float((0.5 * (T[1:] + T[:-1]) * np.diff(deviator, axis=0)).sum() + 0.5 * K * growth[-1] ** 2)
     chosen = range(0, len(time), every)
     kirchhoff = [
-        F[i] @ _slope_of_log(C[i], T[i] / SIGMA_Y) @ F[i].T * SIGMA_Y + K * growth[i] * identity for i in chosen
+        F[i] @ slope_of_log(C[i], T[i] / SIGMA_Y) @ F[i].T * SIGMA_Y + K * growth[i] * identity for i in chosen
     ]
     stress = np.array(kirchhoff) / np.exp(growth[::every])[:, None, None]
     return stress[:, [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]], work

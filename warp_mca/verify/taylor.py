@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from warp_mca.recorders.recorder import Frame
 
 
-class _Foot(FramesOnly):
+class Foot(FramesOnly):
     """A recorder that keeps the final shape of `taylor_bar`.
 
     Attributes:
@@ -86,7 +86,7 @@ _FEET = (("held", 21.42, 7.22), ("free", 21.47, 7.38))  # with final length and 
 
 def mushroom(setup: Setup, count: int, foot: str) -> tuple[float, float]:
     """Final length and radius of the foot [mm], with `count` cells along the bar, a sixth as many over its radius."""
-    shape = _Foot(0.0324, 0.0032)
+    shape = Foot(0.0324, 0.0032)
     scale = setup.by_element(0.15, hex8r=0.12) * 24.0 / count
     mesh = {"axial": count, "section": count // 6, "ring": count // 12}
     setup.run(setup.scene("taylor_bar", foot=foot, time_step_scale=scale, **mesh), recorders=[shape])

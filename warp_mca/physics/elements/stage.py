@@ -182,7 +182,7 @@ class ElementStage:
 
         if chain is None:
             count = self.count if level is None else self.active(level)
-            rates = self.law.general or self.block.viscous  # which have the step of their level
+            rates = self.law.by_points or self.block.viscous  # which have the step of their level
             ends = [end for end in self.block.level_ends if end < count] if rates else []
             for first, end in pairwise([0, *ends, count]):
                 split(end - first, partial(launch_from, first), ELEMENTS)

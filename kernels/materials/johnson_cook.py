@@ -1,0 +1,73 @@
+"""Owns the law of Johnson and Cook: (A + B p^n) (1 + C ln(rate / rate_0)) (1 - T*^m), with adiabatic heating.
+
+Proc. 7th Int. Symp. Ballistics (1983) 541. T* is the temperature from T_room = 0 to T_melt = 1; its rise is
+beta work / (rho c_p), with the share beta of the plastic work that becomes heat (Taylor and Quinney, Proc. R. Soc. A
+143 (1934) 307). Below rate_0 the rate has no effect. A step takes the temperature at its start.
+"""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.materials import radial
+
+wp.set_module_options({"enable_backward": False})
+
+HISTORY = radial.HISTORY  # of whose work the temperature is a function
+
+
+@cache
+def parameters_type(precision: str) -> Any:
+    """A, B [Pa], n, C [-], rate_0 [1/s], m [-], T* at the start [-], its growth with the plastic work [m^3/J]."""
+    return wp.types.vector(8, scalars(precision).real)
+
+
+@cache
+def parameters(precision: str) -> Any:
+    """The function (law, m, scale) -> parameters of row m of `Model.law`, from column 3 on; stresses times `scale`."""
+    R, row = scalars(precision).real, parameters_type(precision)
+
+    @wp.func
+    def johnson_cook_parameters(law: wp.array2d(dtype=R), m: int, scale: R):
+        c = row()
+        for i in range(8):
+            c[i] = law[m, 3 + i]
+        c[0] = scale * c[0]
+        c[1] = scale * c[1]
+        return c
+
+    return johnson_cook_parameters
+
+
+@cache
+def strength(precision: str) -> Any:
+    """As `kernels.materials.radial` asks."""
+    R, row = scalars(precision).real, parameters_type(precision)
+
+    @wp.func
+    def johnson_cook_stress(p: R, dp: R, dt: R, work: R, c: row):
+        hot = wp.clamp(c[6] + c[7] * work, R(0.0), R(1.0))
+        soft = R(1.0) - wp.pow(hot, c[5])
+        hard = c[1] * wp.pow(p, c[2])
+        rate = dp / (dt * c[4])
+        fast = R(1.0) + c[3] * wp.log(wp.max(rate, R(1.0)))
+        slope = c[2] * hard / p * fast
+        if rate > R(1.0):
+            slope += (c[0] + hard) * c[3] / dp
+        return (c[0] + hard) * fast * soft, slope * soft
+
+    return johnson_cook_stress
+
+
+@cache
+def flow(precision: str) -> Any:
+    """The radial return."""
+    return radial.rated_return(precision, strength(precision), parameters_type(precision))
+
+
+@cache
+def plastic_work(precision: str) -> Any:
+    """Of the history."""
+    return radial.kept_work(precision, parameters_type(precision))

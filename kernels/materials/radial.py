@@ -1,0 +1,132 @@
+"""Owns the radial return of isotropic laws: q - 3 G dp = sigma(p + dp, dp / dt, work), by Newton's method in a bracket.
+
+A law gives its flow stress as a function (p, dp, dt, work, c) -> (sigma, slope over dp) [Pa], with the equivalent
+plastic strain p after the growth dp in the time dt [s], and the plastic work per volume before it [J/m^3].
+"""
+
+from functools import cache
+from typing import Any
+
+import warp as wp
+
+from warp_mca.kernels.hardware.scalars import scalars
+
+wp.set_module_options({"enable_backward": False})
+
+MOST = 24  # iterations; four to eight are usual
+LEFT = {"mixed": 2.0**-22, "float64": 2.0**-48}  # residual over the trial stress at which they end
+
+# Plastic strain, its equivalent p, what p lacks [-], plastic work [J/m^3], flow stress of the last flow [Pa].
+HISTORY = ("deviator", "scalar", "scalar", "scalar", "scalar")
+SIZE, WORK = 9, 7  # rows of the history; row of the plastic work
+
+
+@cache
+def increment_function(precision: str, strength: Any, kind: Any) -> Any:
+    """The function (q, G, p, dt, work, c) -> dp, with parameters c of this `kind`; 0 where q is below yield.
+
+    The flow stress does not fall as dp grows, so that the root lies between 0 and (q - sigma(p, 0)) / (3 G). Newton's
+    method starts from above. Where the flow stress is concave it is below the root after a step, and then comes from
+    below. A step out of the bracket goes to a sixteenth of it.
+    """
+    R = scalars(precision).real
+
+    @wp.func
+    def increment(q: R, G: R, p: R, dt: R, work: R, c: kind):
+        stiffness = R(3.0) * G
+        sigma, slope = strength(p, R(0.0), dt, work, c)
+        low = R(0.0)
+        high = (q - sigma) / stiffness
+        x = wp.max(high, R(0.0))
+        if x > R(0.0):
+            for _ in range(wp.static(MOST)):
+                sigma, slope = strength(p + x, x, dt, work, c)
+                residual = stiffness * x + sigma - q
+                if wp.abs(residual) <= R(wp.static(LEFT[precision])) * q:
+                    break
+                if residual > R(0.0):
+                    high = x
+                else:
+                    low = x
+                x = x - residual / (stiffness + slope)
+                if not (x >= low and x <= high):
+                    x = low + R(0.0625) * (high - low)
+        return x
+
+    return increment
+
+
+@cache
+def isotropic_return(precision: str, strength: Any, kind: Any) -> Any:
+    """The `return_map` of a law of flow without rates, see `kernels.materials.laws`."""
+    t = scalars(precision)
+    R, mat33 = t.real, t.mat33
+    increment = increment_function(precision, strength, kind)
+
+    @wp.func
+    def radial_return(elastic: mat33, eps_p: mat33, p: R, G: R, c: kind):
+        trial = elastic - R(2.0) * G * eps_p
+        q = wp.sqrt(R(1.5) * wp.ddot(trial, trial))
+        p_new = p + increment(q, G, p, R(0.0), R(0.0), c)
+        dp = p_new - p  # what p takes of it: the next step corrects the rest, and rounding does not add up
+        eps_p = eps_p + wp.where(dp > R(0.0), R(1.5) * dp / q, R(0.0)) * trial
+        return elastic - R(2.0) * G * eps_p, eps_p, p_new
+
+    return radial_return
+
+
+@cache
+def rated_return(precision: str, strength: Any, kind: Any) -> Any:
+    """The `flow` of a law with rates or heat, whose history is `HISTORY`, see `kernels.materials.laws`.
+
+    The growth dp of slow flow is below the rounding of p. p and the plastic strain then take it once it has added up:
+    a correction by the next step would have the rate of many steps at once.
+    """
+    t = scalars(precision)
+    R, mat33, rows = t.real, t.mat33, wp.types.vector(SIZE, t.real)
+    increment = increment_function(precision, strength, kind)
+
+    @wp.func
+    def rated_flow(elastic: mat33, h: rows, dt: R, G: R, c: kind):
+        trial = elastic - R(2.0) * G * mat33(h[0], h[2], h[4], h[2], h[1], h[3], h[4], h[3], -h[0] - h[1])
+        size = wp.sqrt(R(1.5) * wp.ddot(trial, trial))
+        q = size - R(3.0) * G * h[6]
+        dp = increment(q, G, h[5], dt, h[7], c)
+        S = trial
+        new = h
+        if dp > R(0.0):
+            q = q - R(3.0) * G * dp
+            before = wp.where(h[8] > R(0.0), h[8], q)
+            grown = h[6] + dp
+            p = h[5] + grown
+            taken = p - h[5]
+            flow = (R(1.5) * taken / size) * trial
+            S = (q / size) * trial
+            work = h[7] + R(0.5) * (before + q) * dp
+            new = rows(
+                h[0] + flow[0, 0],
+                h[1] + flow[1, 1],
+                h[2] + flow[0, 1],
+                h[3] + flow[1, 2],
+                h[4] + flow[0, 2],
+                p,
+                grown - taken,
+                work,
+                q,
+            )
+        return S, new, dp
+
+    return rated_flow
+
+
+@cache
+def kept_work(precision: str, kind: Any) -> Any:
+    """The `plastic_work` of a law whose history is `HISTORY`, see `kernels.materials.laws`."""
+    R = scalars(precision).real
+    rows = wp.types.vector(SIZE, R)
+
+    @wp.func
+    def plastic_work(h: rows, c: kind):
+        return h[wp.static(WORK)]
+
+    return plastic_work
