@@ -18,6 +18,9 @@ import traceback
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
+import pytest
+from undrawn import draw_nothing
+
 IMPORTED = """
     gmsh h5py matplotlib.backends.backend_agg matplotlib.figure PIL.Image pxr.UsdGeom pxr.UsdLux pxr.UsdShade
     scipy.integrate scipy.signal scipy.sparse.csgraph warp warp_mca.accuracy.tradeoff warp_mca.cli.main
@@ -75,19 +78,17 @@ def _prepare() -> None:
     for name in IMPORTED:
         importlib.import_module(name)
     import warp
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
 
+    import warp_mca as mca
+    from warp_mca.accuracy.knobs import one_at_a_time
     from warp_mca.recorders.rerun_viewer import load_rerun
-    from warp_mca.results import figure_style
 
     load_rerun()
-    figure_style.DOTS_PER_INCH = 50  # of figures: with 200 they take half a second longer
     warp.config.log_level = warp.LOG_WARNING
-    warp.init()
-    figure = Figure()
-    figure.subplots().set_title("$t$")
-    FigureCanvasAgg(figure).draw()  # finds the fonts
+    mca.run(mca.make_scene("two_link"), refine=0.35, duration=1e-6, device="cpu", threads=1)  # loads its kernels
+    draw_nothing(pytest.MonkeyPatch())
+    tradeoff = sys.modules["warp_mca.accuracy.tradeoff"]
+    tradeoff.one_at_a_time = lambda scene: one_at_a_time(scene)[:2]  # variants
 
 
 def _answer(client: socket.socket, plan: Plan) -> None:

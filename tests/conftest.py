@@ -1,11 +1,16 @@
-"""Skips tests marked `gpu` where there is no CUDA device."""
+"""Owns what all tests share: threads, the skip of tests marked `gpu`, fixtures."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 
 import pytest
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: its threads wait for cores that other tests use
+
 from flying_bars import FlyingBars
+from undrawn import draw_nothing
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -38,3 +43,18 @@ def register() -> Iterator[Callable[..., object]]:
 def bars() -> FlyingBars:
     """A scene for recorders, without a run."""
     return FlyingBars()
+
+
+@pytest.fixture
+def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures are made, but not drawn."""
+    draw_nothing(monkeypatch)
+
+
+@pytest.fixture
+def short_ranges(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ranges that threads can cut small models in."""
+    from impacts import SHORT_RANGES
+
+    for name, length in SHORT_RANGES.items():
+        monkeypatch.setattr(name, length)
