@@ -166,8 +166,8 @@ def exact_course(metal: Any, F: Array, time: Array, finite: bool, every: int) ->
     S, _p, work = integrated(metal, strain - trace / 3.0 * identity, time)
     T, F, Q = (S + metal.bulk_modulus * trace * identity)[::every], F[::every], Q[::every]
     if finite:
-        slopes = [slope_of_log(f.T @ f, t / 1e9) * 1e9 for f, t in zip(F, T, strict=True)]
-        stress = F @ np.array(slopes) @ np.swapaxes(F, 1, 2) / np.linalg.det(F)[:, None, None]
+        slopes = slope_of_log(np.swapaxes(F, 1, 2) @ F, T / 1e9) * 1e9
+        stress = F @ slopes @ np.swapaxes(F, 1, 2) / np.linalg.det(F)[:, None, None]
     else:
         stress = Q @ T @ np.swapaxes(Q, 1, 2)
     return stress[:, [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]], float(work[-1])
