@@ -137,13 +137,16 @@ def quarter(inner: float, outer: float, layers: int) -> mca.Mesh:
     return mca.Mesh(points=np.array(at), hexahedra=cells.astype(np.int32), node_sets=node_sets)
 
 
-def test_a_ring_pressed_on_a_hollow_shaft_has_the_pressure_of_lame():
-    """delta = p b / E ((c^2 + b^2) / (c^2 - b^2) + (b^2 + a^2) / (b^2 - a^2)) of the interference delta in the radius:
+@pytest.mark.parametrize("sets", [("out", "in"), ("boundary", "boundary")])
+def test_a_ring_pressed_on_a_hollow_shaft_has_the_pressure_of_lame(sets: tuple[str, str]):
+    """Of whole skins, too, all nodes of which lie flush with the ends of the other one.
+
+    delta = p b / E ((c^2 + b^2) / (c^2 - b^2) + (b^2 + a^2) / (b^2 - a^2)) of the interference delta in the radius:
     Timoshenko and Goodier, Theory of Elasticity, 28."""
     a, b, c, delta = 5e-3, 10e-3, 20e-3, 1e-5
     meshes = {"shaft": quarter(a, b + 0.5 * delta, 4), "ring": quarter(b - 0.5 * delta, c, 8)}
     planes = [mca.Fixed(body=name, nodes=f"{axis}0", axes=axis) for name in meshes for axis in "xy"]
-    sides = [mca.Surface(body="shaft", nodes="out"), mca.Surface(body="ring", nodes="in")]
+    sides = [mca.Surface(body=name, nodes=nodes) for name, nodes in zip(meshes, sets, strict=True)]
     scene = mca.Scene(
         name="press fit",
         bodies=tuple(mca.Body(name=name, geometry=mesh, material=STEEL) for name, mesh in meshes.items()),

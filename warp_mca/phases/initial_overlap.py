@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.geometry.cell_types import triangulated
-from warp_mca.physics.elements.cells import body_materials
+from warp_mca.phases.press_fit import STARTING, add_flush, press_rate
 from warp_mca.results.contact_history import contact_names
-from warp_mca.scene import OVERLAP_CHOICES, Contact, ContactAll, RigidPlane, Surface
+from warp_mca.scene import OVERLAP_CHOICES, Contact, RigidPlane, Surface
 from warp_mca.watch.skins import depths_below
 
 if TYPE_CHECKING:
@@ -28,10 +28,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 ROUNDING = 1e-6  # of a face's edge: depths up to this are rounding, no overlap
-CROSSINGS = 6.0  # times in which waves cross the longer body while springs of a press fit come to their full force
-LEAST_STEPS = 60  # of these
-WEIGHT = 2.0  # times the weight of all bodies: springs of no more force bear it, and begin with it
-STARTING = 0.01  # of their energy if the full force came at once, the least to which an imbalance is compared
 DEEP = 0.5  # of a face's edge: nodes deeper than this are looked for in the whole body, since faces reach one edge deep
 WITHIN = 0.25  # of a cell's radius: a cell whose middle is deeper lies in the other body, wherever its nodes are
 
@@ -86,33 +82,15 @@ def settle_initial_overlap(ready: Sequence[Prepared], solver: Solver, state: Sta
             if item.initial_overlap == "refuse":
                 depth[mine] = 0.0
             if item.initial_overlap == "press":
-                rate[mine] = _rate(depth[mine], energy[mine], ready[scene], stage, scene, solver)
+                least, most = _rounding(stage, scene, solver), DEEP * _edge(stage, scene)
+                add_flush(depth[mine], energy[mine], (least, most), stage, scene, solver, state)
+                rate[mine] = press_rate(depth[mine], energy[mine], ready[scene], stage, scene, solver)
                 if rate[mine].any():
                     state.scenes[scene].energy_scale += STARTING * float(energy[mine].sum())
                 else:
                     depth[mine] = 0.0
         if stage.overlaps != {"refuse"}:
             stage.rest_at(state, depth, rate)
-
-
-def _rate(depth: Array, energy: Array, ready: Prepared, stage: ContactStage, scene: int, solver: Solver) -> Array:
-    """The a of `kernels.contact.spring.shrink` for springs of these depths and energies [m], shape (spring_count,).
-
-    At once, the full force makes bodies swing about their new shape to twice the stress, and springs of the surface
-    open in steps that make energy. In h a steps up and as many down the overlap is h (h + 1) a.
-    """
-    force = 2.0 * float(np.divide(energy, depth, out=np.zeros_like(depth), where=depth > 0.0).sum())
-    weight = float(np.linalg.norm(ready.scene.gravity)) * float(ready.model.mass.sum())
-    if force <= WEIGHT * weight:
-        return np.zeros_like(depth)
-    contact, crossing = ready.scene.contacts[stage.items[scene].contact], 0.0
-    for body in ready.scene.bodies:
-        if not body.rigid and (isinstance(contact, ContactAll) or body.name in contact.sides):
-            mesh = ready.meshes[body.name]
-            slowest = min(material.wave_speeds["bar"] for material, _ in body_materials(body, mesh))
-            crossing = max(crossing, float(np.ptp(mesh.points, axis=0).max()) / slowest)
-    half = 0.5 * max(CROSSINGS * crossing / solver.nodes.dt, LEAST_STEPS)
-    return depth / (half * (half + 1.0))
 
 
 def _initial_depths(solver: Solver, state: State) -> list[tuple[Array, Array]]:

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
 from warp_mca.base.joining import offsets
-from warp_mca.geometry.face_projection import project
+from warp_mca.geometry.face_projection import Projected, project
 from warp_mca.kernels.contact import bond
 from warp_mca.physics.contact.friction_laws import node_areas
 from warp_mca.physics.contact.sides import find_sides
@@ -76,22 +77,15 @@ def places(contact: Contact, meshes: Mapping[str, Mesh], X: Mapping[str, Array])
     own, _ = meshes[contact.slave.body].surface(contact.slave.nodes)
     faces, _ = meshes[contact.master.body].surface(contact.master.nodes)
     x, points, nodes = X[contact.slave.body], X[contact.master.body], np.unique(own)
-    mine, unit = _normals(x, own), _normals(points, faces)
-    side, best = find_sides(faces, unit), np.full(len(nodes), math.inf)
+    side, best = find_sides(faces, normals(points, faces)), np.full(len(nodes), math.inf)
     face, weight, edge = np.zeros(len(nodes), int), np.zeros((len(nodes), 4)), np.zeros(len(nodes))
     for p in range(side.max(initial=0) + 1):
-        number = np.flatnonzero(side == p)
-        found = project(x[nodes], points, faces[number])
-        which = number[found.face]
+        which, found, opposed = nearest_of_side(x, nodes, own, points, faces, np.flatnonzero(side == p))
         corner = points[faces[which]]
         longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
-        cosine = np.full(len(x), math.inf)
-        normal = np.zeros_like(x)
-        normal[nodes] = unit[which]
-        for k in range(4):
-            np.minimum.at(cosine, own[:, k], (mine * normal[own[:, k]]).sum(axis=1))
-        near = (found.distance <= contact.bond.gap * longest) & (found.beyond <= BEYOND) & (found.apart < best)
-        near &= cosine[nodes] <= OPPOSED
+        near = (
+            (found.distance <= contact.bond.gap * longest) & (found.beyond <= BEYOND) & (found.apart < best) & opposed
+        )
         best[near], face[near] = found.apart[near], which[near]
         weight[near], edge[near] = found.weight[near], longest[near]
     glued = np.isfinite(best)
@@ -101,10 +95,30 @@ def places(contact: Contact, meshes: Mapping[str, Mesh], X: Mapping[str, Array])
     return Place(*(value[glued] for value in (nodes, face, weight, edge)))
 
 
-def _normals(X: Array, face: Index) -> Array:
+def normals(X: Array, face: Index) -> Array:
     """Unit normals of faces [-], shape (face_count, 3)."""
     normal = np.cross(X[face[:, 2]] - X[face[:, 0]], X[face[:, 3]] - X[face[:, 1]])
     return normal / np.linalg.norm(normal, axis=1, keepdims=True)
+
+
+def nearest_of_side(
+    x: Array, nodes: Index, own: Index, X: Array, faces: Index, number: Index
+) -> tuple[Index, Projected, NDArray[np.bool_]]:
+    """Of the faces of these numbers, the nearest to each slave node; where the node lies on it; whether it looks
+    against one of the slave's faces around the node.
+
+    Args:
+        x, X: positions of the slave's and the master's nodes [m], shape (node_count, 3), float64.
+        nodes: of the slave, shape (slave_count,). own, faces: corners of the faces of both, shape (face_count, 4).
+        number: of faces of the master, shape (count,).
+    """
+    found = project(x[nodes], X, faces[number])
+    which, cosine, normal = number[found.face], np.full(len(x), math.inf), np.zeros_like(x)
+    normal[nodes] = normals(X, faces[which])
+    mine = normals(x, own)
+    for k in range(4):
+        np.minimum.at(cosine, own[:, k], (mine * normal[own[:, k]]).sum(axis=1))
+    return which, found, cosine[nodes] <= OPPOSED
 
 
 def on_bonds(
