@@ -26,6 +26,7 @@ PEAK_LOSS = 0.3
 # Force of a flat contact over that of one wave up to which it may be that wave: with default springs, and with others,
 # which may ring at 3.4 times that force.
 WAVE = (1.3, 4.0)
+STILL = 1e-6  # share of a relative velocity along the normal up to which bodies do not approach each other
 WEAK = 0.7  # the same below which springs that were given are softer than waves
 
 
@@ -139,13 +140,13 @@ def _loss(c: Context, k: int, share: float, force: float, time: float) -> float:
 
 
 def _wave_force(c: Context, k: int, contact: Contact, time: float) -> float:
-    """Force that a single wave gives in contact k by `time` [N]: Z v A, inf of rigid bodies."""
+    """Force that a single wave gives in contact k by `time` [N]: Z v A, inf of rigid bodies and where none approach."""
     names, axis = sides_of(contact), c.model.contact_axes[k, 0]
     means = [c.model.V[c.nodes(name)].mean(axis=0) for name in names]
     between = (means[0] - means[1] if len(means) > 1 else means[0]) + time * c.model.gravity[0]
     normal = axis if axis.any() else between / max(float(np.linalg.norm(between)), 1e-30)
+    speed = abs(float(between @ normal))
     soft = [impedance(c, name)[0] for name in names if not c.scene.body(name).rigid]
-    if not soft:
+    if not soft or speed <= STILL * float(np.linalg.norm(between)):
         return math.inf
-    Z = 1.0 / sum(1.0 / own for own in soft)
-    return Z * abs(float(between @ normal)) * min(shadow(c, name, normal) for name in names)
+    return speed / sum(1.0 / Z for Z in soft) * min(shadow(c, name, normal) for name in names)
