@@ -52,8 +52,7 @@ def strength(precision: str) -> Any:
         rate = dp / (dt * c[4])
         fast = R(1.0) + c[3] * wp.log(wp.max(rate, R(1.0)))
         slope = c[2] * hard / p * fast
-        if rate > R(1.0):
-            slope += (c[0] + hard) * c[3] / dp
+        slope += wp.where(rate > R(1.0), (c[0] + hard) * c[3] / dp, R(0.0))
         return (c[0] + hard) * fast, slope
 
     return johnson_cook_stress
