@@ -12,12 +12,13 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.kernels.materials.radial import LEFT, MOST
 
 wp.set_module_options({"enable_backward": False})
 
 HISTORY = ("deviator", "scalar", "deviator", "deviator", "scalar")  # plastic strain, p, back stresses, plastic work
 _BACK, _WORK = 6, 16
+_MOST = 24  # iterations; four to eight are usual
+_LEFT = {"mixed": 2.0**-22, "float64": 2.0**-48}  # residual over the trial stress at which they end
 
 
 @cache
@@ -60,14 +61,14 @@ def increment_function(precision: str) -> Any:
         high = (size - c[0] - c[1] * (R(1.0) - wp.exp(-c[2] * p))) / (R(3.0) * G)
         x = wp.max(high, R(0.0))
         if x > R(0.0):
-            for _ in range(wp.static(MOST)):
+            for _ in range(wp.static(_MOST)):
                 one = R(1.0) / (R(1.0) + c[4] * x)
                 two = R(1.0) / (R(1.0) + c[6] * x)
                 n = trial - one * X1 - two * X2
                 size = wp.sqrt(R(1.5) * wp.ddot(n, n))
                 left = c[1] * wp.exp(-c[2] * (p + x))
                 residual = (R(3.0) * G + one * c[3] + two * c[5]) * x + c[0] + c[1] - left - size
-                if wp.abs(residual) <= R(wp.static(LEFT[precision])) * full:
+                if wp.abs(residual) <= R(wp.static(_LEFT[precision])) * full:
                     break
                 if residual > R(0.0):
                     high = x

@@ -26,7 +26,7 @@ def strength(precision: str) -> Any:
     R, Table, curve = scalars(precision).real, table.table_type(precision), table.curve_function(precision, COUNT)
 
     @wp.func
-    def rated_stress(p: R, dp: R, dt: R, work: R, c: Table):
+    def rated_stress(p: R, dp: R, dt: R, c: Table):
         static, slope, _work = curve(p, c)
         root = c.law[c.row, wp.static(ROOT)]
         over = wp.pow(dp / (dt * c.law[c.row, wp.static(D)]), root)

@@ -47,24 +47,38 @@ def strength(precision: str) -> Any:
     R, row = scalars(precision).real, parameters_type(precision)
 
     @wp.func
-    def johnson_cook_stress(p: R, dp: R, dt: R, work: R, c: row):
-        hot = wp.clamp(c[6] + c[7] * work, R(0.0), R(1.0))
-        soft = R(1.0) - wp.pow(hot, c[5])
+    def johnson_cook_stress(p: R, dp: R, dt: R, c: row):
         hard = c[1] * wp.pow(p, c[2])
         rate = dp / (dt * c[4])
         fast = R(1.0) + c[3] * wp.log(wp.max(rate, R(1.0)))
         slope = c[2] * hard / p * fast
-        if rate > R(1.0):
-            slope += (c[0] + hard) * c[3] / dp
-        return (c[0] + hard) * fast * soft, slope * soft
+        slope += wp.where(rate > R(1.0), (c[0] + hard) * c[3] / dp, R(0.0))
+        return (c[0] + hard) * fast, slope
 
     return johnson_cook_stress
 
 
 @cache
+def heated(precision: str) -> Any:
+    """The function (c, work) -> c with A and B as the heat of the plastic work [J/m^3] leaves them."""
+    R, row = scalars(precision).real, parameters_type(precision)
+
+    @wp.func
+    def heated_parameters(c: row, work: R):
+        hot = wp.clamp(c[6] + c[7] * work, R(0.0), R(1.0))
+        soft = R(1.0) - wp.pow(hot, c[5])
+        found = c
+        found[0] = soft * c[0]
+        found[1] = soft * c[1]
+        return found
+
+    return heated_parameters
+
+
+@cache
 def flow(precision: str) -> Any:
     """The radial return."""
-    return radial.rated_return(precision, strength(precision), parameters_type(precision))
+    return radial.rated_return(precision, strength(precision), parameters_type(precision), heated(precision))
 
 
 @cache

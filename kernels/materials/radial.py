@@ -1,7 +1,7 @@
-"""Owns the radial return of isotropic laws: q - 3 G dp = sigma(p + dp, dp / dt, work), by Newton's method in a bracket.
+"""Owns the radial return of isotropic laws: q - 3 G dp = sigma(p + dp, dp / dt), by Newton's method in a bracket.
 
-A law gives its flow stress as a function (p, dp, dt, work, c) -> (sigma, slope over dp) [Pa], with the equivalent
-plastic strain p after the growth dp in the time dt [s], and the plastic work per volume before it [J/m^3].
+A law gives its flow stress as a function (p, dp, dt, c) -> (sigma, slope over dp) [Pa], with the equivalent plastic
+strain p after the growth dp in the time dt [s].
 """
 
 from functools import cache
@@ -13,45 +13,44 @@ from warp_mca.kernels.hardware.scalars import scalars
 
 wp.set_module_options({"enable_backward": False})
 
-MOST = 24  # iterations; four to eight are usual
-LEFT = {"mixed": 2.0**-22, "float64": 2.0**-48}  # residual over the trial stress at which they end
+ITERATIONS = 7  # two or three are usual where the rate is that of the step before
 
-# Plastic strain, its equivalent p, what p lacks [-], plastic work [J/m^3], flow stress of the last flow [Pa].
-HISTORY = ("deviator", "scalar", "scalar", "scalar", "scalar")
-SIZE, WORK = 9, 7  # rows of the history; row of the plastic work
+# Plastic strain, its equivalent p, what p lacks [-], plastic work [J/m^3]; of the last step that flowed the flow stress
+# [Pa] and the growth of p [-].
+HISTORY = ("deviator", "scalar", "scalar", "scalar", "scalar", "scalar")
+SIZE, WORK = 10, 7  # rows of the history; row of the plastic work
 
 
 @cache
 def increment_function(precision: str, strength: Any, kind: Any) -> Any:
-    """The function (q, G, p, dt, work, c) -> dp, with parameters c of this `kind`; 0 where q is below yield.
+    """The function (q, G, p, dt, guess, c) -> dp, with parameters c of this `kind`; 0 where q is below yield.
 
     The flow stress does not fall as dp grows, so that the root lies between 0 and (q - sigma(p, 0)) / (3 G). Newton's
-    method starts from above. Where the flow stress is concave it is below the root after a step, and then comes from
-    below. A step out of the bracket goes to a sixteenth of it.
+    method starts from the guess, or from above where that is 0. Where the flow stress is concave it is below the root
+    after a step, and then comes from below. A step out of the bracket goes to a sixteenth of it. There are no branches,
+    so that a CPU computes several elements at once.
     """
     R = scalars(precision).real
 
     @wp.func
-    def increment(q: R, G: R, p: R, dt: R, work: R, c: kind):
+    def increment(q: R, G: R, p: R, dt: R, guess: R, c: kind):
         stiffness = R(3.0) * G
-        sigma, slope = strength(p, R(0.0), dt, work, c)
-        low = R(0.0)
+        sigma, slope = strength(p, R(0.0), dt, c)
         high = (q - sigma) / stiffness
-        x = wp.max(high, R(0.0))
-        if x > R(0.0):
-            for _ in range(wp.static(MOST)):
-                sigma, slope = strength(p + x, x, dt, work, c)
-                residual = stiffness * x + sigma - q
-                if wp.abs(residual) <= R(wp.static(LEFT[precision])) * q:
-                    break
-                if residual > R(0.0):
-                    high = x
-                else:
-                    low = x
-                x = x - residual / (stiffness + slope)
-                if not (x >= low and x <= high):
-                    x = low + R(0.0625) * (high - low)
-        return x
+        flows = high > R(0.0)
+        high = wp.where(flows, high, R(1e-6))  # any, where the result is not taken
+        low = R(0.0)
+        x = wp.where(guess > R(0.0), wp.min(high, guess), high)
+        for _ in range(wp.static(ITERATIONS)):
+            sigma, slope = strength(p + x, x, dt, c)
+            residual = stiffness * x + sigma - q
+            above = residual > R(0.0)
+            high = wp.where(above, x, high)
+            low = wp.where(above, low, x)
+            step = x - residual / (stiffness + slope)
+            inside = step >= low and step <= high
+            x = wp.where(inside, step, low + R(0.0625) * (high - low))
+        return wp.where(flows, x, R(0.0))
 
     return increment
 
@@ -76,8 +75,10 @@ def isotropic_return(precision: str, strength: Any, kind: Any) -> Any:
 
 
 @cache
-def rated_return(precision: str, strength: Any, kind: Any) -> Any:
+def rated_return(precision: str, strength: Any, kind: Any, heated: Any = None) -> Any:
     """The `flow` of a law with rates or heat, whose history is `HISTORY`, see `kernels.materials.laws`.
+
+    `heated` is the function (c, work) -> c that changes the parameters with the plastic work before the step.
 
     The growth dp of slow flow is below the rounding of p. p and the plastic strain then take it once it has added up:
     a correction by the next step would have the rate of many steps at once.
@@ -91,7 +92,9 @@ def rated_return(precision: str, strength: Any, kind: Any) -> Any:
         trial = elastic - R(2.0) * G * mat33(h[0], h[2], h[4], h[2], h[1], h[3], h[4], h[3], -h[0] - h[1])
         size = wp.sqrt(R(1.5) * wp.ddot(trial, trial))
         q = size - R(3.0) * G * h[6]
-        dp = increment(q, G, h[5], dt, h[7], c)
+        if wp.static(heated is not None):
+            c = heated(c, h[7])
+        dp = increment(q, G, h[5], dt, h[9], c)
         S = trial
         new = h
         if dp > R(0.0):
@@ -113,6 +116,7 @@ def rated_return(precision: str, strength: Any, kind: Any) -> Any:
                 grown - taken,
                 work,
                 q,
+                dp,
             )
         return S, new, dp
 

@@ -82,7 +82,7 @@ def strength(precision: str) -> Any:
     R, Table, curve = scalars(precision).real, table_type(precision), curve_function(precision, COUNT)
 
     @wp.func
-    def table_stress(p: R, dp: R, dt: R, work: R, c: Table):
+    def table_stress(p: R, dp: R, dt: R, c: Table):
         stress, slope, _work = curve(p, c)
         return stress, slope
 
