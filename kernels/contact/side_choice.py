@@ -209,6 +209,8 @@ def choice_functions(friction: bool, sides: int) -> tuple[Any, Any]:
         if e == choice.newcomer:
             if not (choice.returns and touches):
                 found.begins = choice.begins
+            if found.begins == wp.float64(FAR) and touch.held < wp.float64(ANY_DEPTH):
+                found.begins = wp.max(-wp.dot(touch.du, near.normal), wp.float64(0.0))
             found.touches = touches or choice.leaver >= 0 or choice.returns
         elif e == choice.leaver or (choice.passed >> (e - node.begin)) % 2 == 1:
             found.touches = bool(False)
