@@ -55,6 +55,7 @@ def build(
                 mu=mu,
                 penalty=penalty,
                 initial_overlap="press",
+                law=mca.Penalty(),  # undamped, as the closed form
             ),
         ),
         fixed=(mca.Fixed(body="ball", nodes="zmin", axes="z"),),

@@ -46,7 +46,16 @@ def build(
     return mca.Scene(
         name="sliding_block",
         bodies=(block,),
-        contacts=(mca.Contact(slave=sole, master=mca.RigidPlane(), mu=mu, penalty=penalty, initial_overlap="press"),),
+        contacts=(
+            mca.Contact(
+                slave=sole,
+                master=mca.RigidPlane(),
+                mu=mu,
+                penalty=penalty,
+                initial_overlap="press",
+                law=mca.Penalty(),  # undamped, as the closed form
+            ),
+        ),
         impact=mca.ImpactPhase(duration=duration, output_interval=duration / 240.0),
         gravity=(0.0, -g, 0.0),
         tip=mca.Point(body="block", at=(0.5 * size[0], 0.5 * size[1], 0.5 * size[2])),

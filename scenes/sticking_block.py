@@ -40,7 +40,16 @@ def build(
     return mca.Scene(
         name="sticking_block",
         bodies=(block,),
-        contacts=(mca.Contact(slave=sole, master=mca.RigidPlane(), mu=mu, penalty=penalty, initial_overlap="press"),),
+        contacts=(
+            mca.Contact(
+                slave=sole,
+                master=mca.RigidPlane(),
+                mu=mu,
+                penalty=penalty,
+                initial_overlap="press",
+                law=mca.Penalty(),  # undamped, as the closed form
+            ),
+        ),
         fixed=tuple(mca.Fixed(body="block", nodes=nodes, axes="y") for nodes in ("ymin", "ymax")),
         impact=mca.ImpactPhase(duration=periods * period, output_interval=period / 40.0),
         tip=mca.Point(body="block", at=(0.0, 0.0, 0.0)),

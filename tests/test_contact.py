@@ -123,10 +123,11 @@ def sliding_block(mu, *, velocity=(1.0, 0.0, 0.0), belt=(0.0, 0.0, 0.0), duratio
     box = mca.Box(size=(0.02, 0.01, 0.02), divisions=(2, 1, 2))
     plane = mca.RigidPlane(point=(0.0, MASS * GRAVITY / SPRINGS, 0.0), normal=(0.0, 3.0, 0.0), velocity=belt)
     surface = mca.Surface(body="block", nodes="ymin")
+    undamped = {"penalty": PENALTY, "initial_overlap": "press", "law": mca.Penalty()}
     return mca.Scene(
         name="block",
         bodies=(mca.Body(name="block", geometry=box, material=SOFT, velocity=velocity),),
-        contacts=(mca.Contact(slave=surface, master=plane, mu=mu, penalty=PENALTY, initial_overlap="press"),),
+        contacts=(mca.Contact(slave=surface, master=plane, mu=mu, **undamped),),
         gravity=(0.0, -GRAVITY, 0.0),
         impact=mca.ImpactPhase(duration=duration, output_interval=2e-5),
         tip=mca.Point(body="block", at=(0.01, 0.005, 0.01)),

@@ -57,7 +57,7 @@ def cube(tolerance: float = 0.01, scale: float = 0.9, penalty: float | None = No
 
 
 def slope(angle: float, tolerance: float = 0.01, mu: float = 0.4) -> mca.Scene:
-    """A soft block that lies on a slope."""
+    """A soft block that lies on a slope, without the dashpot that its contact would have."""
     plane = mca.RigidPlane(normal=(math.sin(angle), math.cos(angle), 0.0))
     box = mca.Box(size=(0.03, 0.01, 0.02), divisions=(5, 2, 4))
     soft = mca.Elastic(E=5e7, nu=0.3, rho=1200.0)
@@ -66,7 +66,7 @@ def slope(angle: float, tolerance: float = 0.01, mu: float = 0.4) -> mca.Scene:
         name="slope",
         bodies=(block,),
         gravity=(0.0, -80.0, 0.0),
-        contacts=(mca.Contact(slave=mca.Surface(body="block", nodes="ymin"), master=plane, mu=mu),),
+        contacts=(mca.Contact(slave=mca.Surface(body="block", nodes="ymin"), master=plane, mu=mu, law=mca.Penalty()),),
         impact=mca.ImpactPhase(duration=0.02, output_interval=1e-4, energy_tolerance=tolerance),
         probes=(mca.Probe(name="skin", body="block", nodes="boundary"),),
     )

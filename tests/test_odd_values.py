@@ -17,6 +17,7 @@ from warp_mca import geometry, scene
 from warp_mca.base.errors import GuardError, RequestError
 from warp_mca.scene import materials
 from warp_mca.scene.joints import Joint
+from warp_mca.verify.metals import METALS
 
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
 METAL = mca.J2Bilinear(E=210e9, nu=0.3, rho=7850.0, sigma_y=4e8, E_t=1e9, beta=0.5)
@@ -27,6 +28,7 @@ TIP = mca.Tip(body="up", centre=(0.005, 0.0, 0.005), radius=0.001)
 SOUND: dict[type, Any] = {
     mca.Elastic: STEEL,
     mca.J2Bilinear: METAL,
+    **{type(metal): metal for metal in METALS.values()},
     mca.Box: mca.Box(size=(0.01, 0.01, 0.01), divisions=(1, 1, 1)),
     mca.Rod: mca.Rod(radius=0.01, length=0.05, section=2, ring=1, axial=2, tip_layers=1, focus_layers=1),
     mca.LugRod: mca.LugRod(radius=0.01, length=0.06, section=4, ring=1, axial=2, tip_layers=1, focus_layers=1),
