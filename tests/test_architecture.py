@@ -95,16 +95,7 @@ def test_functions_that_the_page_names_exist():
     assert len(named) > 12
     for file, name in named:
         path = ROOT / file if file.startswith("kernels/") else ROOT / "warp_mca" / file
-        defined = {
-            f"{owner.name}.{item.target.id if isinstance(item, ast.AnnAssign) else item.name}"
-            for owner in ast.walk(tree_of(path))
-            if isinstance(owner, ast.ClassDef)
-            for item in owner.body
-            if isinstance(item, ast.FunctionDef)
-            or (isinstance(item, ast.AnnAssign) and isinstance(item.target, ast.Name))
-        }
-        defined |= {n.name for n in ast.walk(tree_of(path)) if isinstance(n, ast.FunctionDef | ast.ClassDef)}
-        assert name in defined, f"{file} has no {name}"
+        assert name in defined(tree_of(path)), f"{file} has no {name}"
 
 
 def everything() -> mca.Scene:

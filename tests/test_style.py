@@ -6,33 +6,34 @@ import ast
 import re
 from collections.abc import Iterator
 from functools import cache
-from pathlib import Path
+from typing import Any
 
 import pytest
+from test_structure import ROOT, tree_of
 
-ROOT = Path(__file__).resolve().parents[1]
 KERNEL_FILES = sorted((ROOT / "kernels").rglob("*.py"))
 TEST_FILES = sorted((ROOT / "tests").glob("*.py"))
 HOST_FILES = sorted([*(ROOT / "warp_mca").rglob("*.py"), *(ROOT / "scenes").glob("*.py")])
 ALLOCATE = {"zeros", "ones", "empty", "full", "array", "clone", "zeros_like", "ones_like", "empty_like", "full_like"}
 IN_PLACE = "spring"  # the one struct of arrays that kernels read and write
-STRUCTS = {  # classes of arrays that kernels take whole
-    node.name
-    for path in KERNEL_FILES
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-    if isinstance(node, ast.ClassDef) and any(ast.unparse(mark) == "wp.struct" for mark in node.decorator_list)
-    if any(isinstance(field, ast.AnnAssign) and "wp.array" in ast.unparse(field.annotation) for field in node.body)
-}
 
 
-def parse(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"))
+@cache
+def structs() -> set[str]:
+    """Names of classes of arrays that kernels take whole."""
+    return {
+        node.name
+        for path in KERNEL_FILES
+        for node in ast.walk(tree_of(path))
+        if isinstance(node, ast.ClassDef) and any(ast.unparse(mark) == "wp.struct" for mark in node.decorator_list)
+        if any(isinstance(field, ast.AnnAssign) and "wp.array" in ast.unparse(field.annotation) for field in node.body)
+    }
 
 
-def decorated(tree: ast.AST, *names: str) -> Iterator[ast.FunctionDef]:
-    """Functions under @wp.<name> or @wp.<name>(...)."""
+def decorated(tree: ast.AST, *names: str) -> Iterator[Any]:
+    """Functions and structs under @wp.<name> or @wp.<name>(...)."""
     for node in ast.walk(tree):
-        if isinstance(node, ast.FunctionDef):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
             marks = [mark.func if isinstance(mark, ast.Call) else mark for mark in node.decorator_list]
             if any(ast.unparse(mark) in {f"wp.{name}" for name in names} for mark in marks):
                 yield node
@@ -43,17 +44,14 @@ def parameters(function: ast.FunctionDef) -> dict[str, str]:
     return {a.arg: ast.unparse(a.annotation) if a.annotation else "" for a in function.args.args}
 
 
-def device_functions() -> list:
-    """Every kernel and function for the device, named by file."""
+@cache
+def device_functions(*kinds: str) -> list[tuple[str, ast.FunctionDef]]:
+    """Every function for the device of these kinds, under `file.name`."""
     return [
-        pytest.param(function, id=f"{path.stem}.{function.name}")
+        (f"{path.stem}.{function.name}", function)
         for path in KERNEL_FILES
-        for function in decorated(parse(path), "kernel", "func")
+        for function in decorated(tree_of(path), *kinds)
     ]
-
-
-def kernels() -> list:
-    return [item for item in device_functions() if list(decorated(ast.Module([item.values[0]], []), "kernel"))]
 
 
 def root(target: ast.expr) -> str:
@@ -66,10 +64,9 @@ def root(target: ast.expr) -> str:
 @cache
 def outputs_of_functions() -> dict[str, list[int]]:
     """Which arguments each function of the kernels writes, by its name."""
-    native = [f for path in KERNEL_FILES for f in decorated(parse(path), "func_native")]
     return {
         item.name: [k for k, name in enumerate(parameters(item)) if name.endswith("_out")]
-        for item in [*native, *(item.values[0] for item in device_functions())]
+        for _, item in [*device_functions("func_native"), *device_functions("kernel", "func")]
     }
 
 
@@ -91,8 +88,8 @@ def written(function: ast.FunctionDef) -> set[str]:
 
 
 def test_there_are_kernels_to_look_at():
-    assert len(kernels()) >= 15
-    assert {"Spring", "Patches"} <= STRUCTS
+    assert len(device_functions("kernel")) >= 15
+    assert {"Spring", "Patches"} <= structs()
 
 
 def test_a_write_to_a_member_of_a_struct_is_seen():
@@ -101,62 +98,72 @@ def test_a_write_to_a_member_of_a_struct_is_seen():
     assert written(function) == {"patches"}
 
 
-@pytest.mark.parametrize("kernel", kernels())
-def test_outputs_are_named_and_come_last(kernel: ast.FunctionDef):
-    names = list(parameters(kernel))
-    outputs = [name for name in names if name.endswith("_out")]
-    assert outputs or IN_PLACE in names
-    assert names[len(names) - len(outputs) :] == outputs
-    if IN_PLACE in names:
-        assert names.index(IN_PLACE) == len(names) - len(outputs) - 1
+def test_outputs_are_named_and_come_last():
+    wrong = []
+    for label, kernel in device_functions("kernel"):
+        names = list(parameters(kernel))
+        outputs = [name for name in names if name.endswith("_out")]
+        first = len(names) - len(outputs)
+        last = names[first:] == outputs and (IN_PLACE not in names or names.index(IN_PLACE) == first - 1)
+        if not last or not (outputs or IN_PLACE in names):
+            wrong.append(label)
+    assert wrong == []
 
 
-@pytest.mark.parametrize("function", device_functions())
-def test_only_outputs_are_written(function: ast.FunctionDef):
-    names = parameters(function)
-    arrays = {name for name, kind in names.items() if kind.startswith("wp.array") or kind.split(".")[-1] in STRUCTS}
-    outputs = {name for name in names if name.endswith("_out")}
-    assert written(function) & arrays <= outputs | {IN_PLACE}
-    assert outputs <= written(function)
+def test_only_outputs_are_written():
+    wrong = []
+    for label, function in device_functions("kernel", "func"):
+        names = parameters(function)
+        arrays = {
+            name for name, kind in names.items() if kind.startswith("wp.array") or kind.split(".")[-1] in structs()
+        }
+        outputs = {name for name in names if name.endswith("_out")}
+        if not (written(function) & arrays <= outputs | {IN_PLACE} and outputs <= written(function)):
+            wrong.append(label)
+    assert wrong == []
 
 
-@pytest.mark.parametrize("kernel", kernels())
-def test_kernels_carry_no_adjoint(kernel: ast.FunctionDef):
-    (mark,) = [ast.unparse(mark) for mark in kernel.decorator_list]
-    assert "enable_backward=False" in mark
-
-
-@pytest.mark.parametrize("path", KERNEL_FILES, ids=lambda path: path.stem)
-def test_kernel_files_allocate_nothing(path: Path):
-    tree = parse(path)
-    types = {
-        id(inner)
-        for node in ast.walk(tree)
-        if isinstance(node, ast.arg | ast.AnnAssign) and node.annotation
-        for inner in ast.walk(node.annotation)
+def test_kernels_carry_no_adjoint():
+    marks = {
+        label: [ast.unparse(mark) for mark in kernel.decorator_list] for label, kernel in device_functions("kernel")
     }
-    views = {id(n) for n in ast.walk(tree) if isinstance(n, ast.Call) and "ptr" in {k.arg for k in n.keywords}}
-    skip = types | views
-    calls = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call) and id(node) not in skip]
-    assert not [f"line {f.lineno}" for f in calls if isinstance(f, ast.Attribute) and f.attr in ALLOCATE]
-    assert not [f"line {f.lineno}" for f in calls if ast.unparse(f) == "wp.launch"]
+    assert [label for label, mark in marks.items() if len(mark) != 1 or "enable_backward=False" not in mark[0]] == []
 
 
-@pytest.mark.parametrize("path", HOST_FILES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_host_code_holds_no_kernels(path: Path):
-    assert not [function.name for function in decorated(parse(path), "kernel", "func", "struct")]
+def test_kernel_files_allocate_nothing():
+    wrong = []
+    for path in KERNEL_FILES:
+        nodes = list(ast.walk(tree_of(path)))
+        types = {
+            id(inner)
+            for node in nodes
+            if isinstance(node, ast.arg | ast.AnnAssign) and node.annotation
+            for inner in ast.walk(node.annotation)
+        }
+        called = [node for node in nodes if isinstance(node, ast.Call)]
+        views = {id(node) for node in called if "ptr" in {word.arg for word in node.keywords}}
+        calls = [node.func for node in called if id(node) not in types | views]
+        wrong += [
+            f"{path.stem}, line {f.lineno}"
+            for f in calls
+            if (isinstance(f, ast.Attribute) and f.attr in ALLOCATE) or ast.unparse(f) == "wp.launch"
+        ]
+    assert wrong == []
 
 
-def dataclasses() -> list:
-    """Every public dataclass and device struct."""
-    found = []
+def test_host_code_holds_no_kernels():
+    found = {path.stem: [f.name for f in decorated(tree_of(path), "kernel", "func", "struct")] for path in HOST_FILES}
+    assert {path: names for path, names in found.items() if names} == {}
+
+
+def dataclasses() -> Iterator[tuple[str, ast.ClassDef]]:
+    """Every public dataclass and device struct, under `file.name`."""
     for path in [*HOST_FILES, *KERNEL_FILES]:
-        for node in ast.walk(parse(path)):
-            marks = " ".join(ast.unparse(mark) for mark in getattr(node, "decorator_list", []))
-            public = isinstance(node, ast.ClassDef) and not node.name.startswith("_")
-            if public and ("dataclass" in marks or "wp.struct" in marks):
-                found.append(pytest.param(node, id=f"{path.stem}.{node.name}"))
-    return found
+        for node in ast.walk(tree_of(path)):
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                marks = " ".join(ast.unparse(mark) for mark in node.decorator_list)
+                if "dataclass" in marks or "wp.struct" in marks:
+                    yield f"{path.stem}.{node.name}", node
 
 
 def fields(cls: ast.ClassDef) -> dict[str, str]:
@@ -184,20 +191,27 @@ def entries(doc: str) -> dict[str, str]:
     return found
 
 
-@pytest.mark.parametrize("cls", dataclasses())
-def test_every_field_is_documented(cls: ast.ClassDef):
+def undocumented(cls: ast.ClassDef) -> str:
+    """What the docstring of a class leaves out or says too much, empty where nothing."""
     doc = ast.get_docstring(cls) or ""
     names = fields(cls)
     if "Attributes:" not in doc:  # a class of few fields may say it in a sentence
-        assert len(names) <= 4 or all(re.search(rf"\b{name}\b", doc) for name in names)
-        return
+        missing = [name for name in names if not re.search(rf"\b{name}\b", doc)]
+        return f"{missing} undocumented" if len(names) > 4 and missing else ""
     listed = entries(doc)
-    assert set(names) <= set(listed)
     methods = {node.name for node in cls.body if isinstance(node, ast.FunctionDef)}
-    assert set(listed) <= set(names) | methods
-    for name, kind in names.items():
-        if kind in ("Array", "Index") or kind.startswith("NDArray"):
-            assert re.search(r"float64|float32|int32|uint16|uint8|bool", listed[name]), f"{name} has no dtype"
+    if not set(names) <= set(listed) <= set(names) | methods:
+        return f"{set(names) ^ set(listed)} undocumented or no field"
+    arrays = [name for name, kind in names.items() if kind in ("Array", "Index") or kind.startswith("NDArray")]
+    types = r"float64|float32|int32|uint16|uint8|bool"
+    bare = [name for name in arrays if not re.search(types, listed[name])]
+    return f"{bare} without dtype" if bare else ""
+
+
+def test_every_field_is_documented():
+    found = {label: undocumented(cls) for label, cls in dataclasses()}
+    assert len(found) > 100
+    assert {label: what for label, what in found.items() if what} == {}
 
 
 def patched(tree: ast.AST) -> Iterator[str]:
@@ -228,6 +242,8 @@ def test_a_patch_of_the_solver_is_seen(source: str):
     assert "Solver" in "".join(patched(ast.parse(source)))
 
 
-@pytest.mark.parametrize("path", TEST_FILES, ids=lambda path: path.stem)
-def test_tests_read_the_state_and_leave_the_solver_alone(path: Path):
-    assert not [what for what in patched(parse(path)) if re.search(r"\bSolver\b", what)]
+def test_tests_read_the_state_and_leave_the_solver_alone():
+    found = {
+        path.stem: [what for what in patched(tree_of(path)) if re.search(r"\bSolver\b", what)] for path in TEST_FILES
+    }
+    assert {path: what for path, what in found.items() if what} == {}
