@@ -25,7 +25,7 @@ from pathlib import Path
 
 from benchmarks.measurements import FOLDER, note
 from benchmarks.random_scenes.crossing import FAMILIES, LOT
-from benchmarks.random_scenes.measure import Row, Task, measure
+from benchmarks.random_scenes.measure import Row, Task, in_time
 from benchmarks.random_scenes.page import line, tables, write_page
 from benchmarks.random_scenes.show import show
 
@@ -41,11 +41,6 @@ def rows_of(tasks: list[Task], processes: int, seconds: float = math.inf) -> Ite
         return
     with multiprocessing.get_context("spawn").Pool(processes) as pool:
         yield from filter(None, pool.imap_unordered(begun, tasks))
-
-
-def in_time(end: float, task: Task) -> Row | None:
-    """The row of a task, or None if it is too late to begin."""
-    return measure(task) if time.time() < end else None
 
 
 def is_known(row: Row, finer: bool) -> bool:

@@ -43,6 +43,11 @@ def measure(task: Task) -> Row:
         log.setLevel(level)
 
 
+def in_time(end: float, task: Task) -> Row | None:
+    """The row of a task, or None after the time `end`, as `time.time` has it."""
+    return measure(task) if time.time() < end else None
+
+
 def judged(task: Task) -> Row:
     """What there is to say of a scene."""
     family, seed, device, finer = task
