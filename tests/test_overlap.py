@@ -21,7 +21,6 @@ KERNELS = Path(node.__file__).parents[1]
 # As float32 without and float64 with what a model may have more, plasticity, friction, scenes of their own, ...
 TWO = (("mixed", False), ("float64", True))
 LAWS = {False: Elastic.law, True: J2Bilinear.law}
-PATCHES = [hex8_patch, hex8r_patch, hex8i_patch.kernels(8)]
 VARIANTS = {
     "integrate": [
         *(node.integrate_kernel(Kind(p, not m, m, False, not m), True, m, m) for p, m in TWO),
@@ -31,14 +30,18 @@ VARIANTS = {
     "advance_bound": [constraint.bound_kernel(Kind(p, m, m), m) for p, m in TWO],
     "see_nodes": [floating.see_nodes],
     "touch_surface": [contact.surface_kernel(m, m) for _, m in TWO],
-    "touch_sides": [sides.sided_kernel(m, m, 3) for _, m in TWO],
+    "touch_sides": [sides.sided_kernel(True, True, 3)],  # takes 7 s to compile
     "touch_plane": [contact.plane_kernel(m, m) for _, m in TWO],
     "carry": [edge_shares.carry_kernel(3)],
     "react": [contact.react_kernel(m, contact.LANES) for _, m in TWO],
     "tet4_dilatation": [tet4.dilatation_kernel(p, m) for p, m in TWO],
     "tet4_average": [tet4.average_kernel(p) for p, _ in TWO],
     "tet4_force": [tet4.force_kernel(p, LAWS[m], False) for p, m in TWO],
-    "patch_force": [own.force_kernel(p, LAWS[not m]) for own in PATCHES for p, m in TWO],
+    # All begin alike (`patch_kernel.py`): one of each element, one of them with lanes for elements that yield.
+    "patch_force": [
+        hex8_patch.force_kernel("mixed", LAWS[True]),
+        *(own.force_kernel("float64", LAWS[False]) for own in (hex8r_patch, hex8i_patch.kernels(8))),
+    ],
 }
 # Reads ahead of the wait: the first two slots and the mass of a node, its number where it is listed, or its place and
 # frame; head, corners and points of patches.
