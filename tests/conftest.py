@@ -1,11 +1,15 @@
-"""Skips tests marked `gpu` where there is no CUDA device."""
+"""Owns what all tests share: threads, the skip of tests marked `gpu`, registrations that end with a test, no figures."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 
 import pytest
-from flying_bars import FlyingBars
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: its threads wait for cores that other tests use
+
+from flying_bars import FlyingBars  # noqa: E402
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -38,3 +42,10 @@ def register() -> Iterator[Callable[..., object]]:
 def bars() -> FlyingBars:
     """A scene for recorders, without a run."""
     return FlyingBars()
+
+
+@pytest.fixture
+def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Drawing the figures of results takes longer than the runs."""
+    for figure in ("force_figure.save_forces", "energy_figure.save_energies"):
+        monkeypatch.setattr(f"warp_mca.results.{figure}", lambda *_: None)

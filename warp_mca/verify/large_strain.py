@@ -16,11 +16,17 @@ STRAIN = 0.08  # greatest axial strain [-]
 
 
 def _slope_of_log(C: Array, T: Array) -> Array:
-    """Derivative of the logarithm at C in the direction T, shape (3, 3): the corner of a matrix of twice the size."""
-    from scipy.linalg import logm
-
-    both = np.block([[C, T], [np.zeros((3, 3)), C]])
-    return np.real(logm(both))[:3, 3:]
+    """Derivative of the logarithm at each C in the direction T, shapes (count, 3, 3): the corner of matrices of twice
+    the size, ln B = 2 artanh((B - I) (B + I)^-1) as a series, for stretches between a half and two."""
+    both, identity = np.zeros((len(C), 6, 6)), np.eye(6)
+    both[:, :3, :3] = both[:, 3:, 3:] = C
+    both[:, :3, 3:] = T
+    power = np.linalg.solve(both + identity, both - identity)
+    square, half = power @ power, np.zeros_like(both)
+    for odd in range(1, 60, 2):
+        half += power / odd
+        power = power @ square
+    return 2.0 * half[:, :3, 3:]
 
 
 def _exact_course(F: Array, time: Array, beta: float, every: int) -> tuple[Array, float]:
@@ -34,19 +40,17 @@ def _exact_course(F: Array, time: Array, beta: float, every: int) -> tuple[Array
         beta: share of isotropic hardening.
         every: step between the rows of the stress.
     """
-    K, identity = E / (3.0 * (1.0 - 2.0 * NU)), np.eye(3)
+    K = E / (3.0 * (1.0 - 2.0 * NU))
     C = np.swapaxes(F, 1, 2) @ F
     squared, axes = np.linalg.eigh(C)
     strain = axes @ (0.5 * np.log(squared)[:, :, None] * np.swapaxes(axes, 1, 2))
     growth = np.trace(strain, axis1=1, axis2=2)  # ln J
-    deviator = strain - growth[:, None, None] / 3.0 * identity
+    deviator = strain - growth[:, None, None] / 3.0 * np.eye(3)
     T = integrated_stress(deviator, time, beta)
     work = float((0.5 * (T[1:] + T[:-1]) * np.diff(deviator, axis=0)).sum() + 0.5 * K * growth[-1] ** 2)
-    chosen = range(0, len(time), every)
-    kirchhoff = [
-        F[i] @ _slope_of_log(C[i], T[i] / SIGMA_Y) @ F[i].T * SIGMA_Y + K * growth[i] * identity for i in chosen
-    ]
-    stress = np.array(kirchhoff) / np.exp(growth[::every])[:, None, None]
+    f, growth = F[::every], growth[::every, None, None]
+    slope = _slope_of_log(C[::every], T[::every] / SIGMA_Y) * SIGMA_Y
+    stress = (f @ slope @ np.swapaxes(f, 1, 2) + K * growth * np.eye(3)) / np.exp(growth)
     return stress[:, [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]], work
 
 
