@@ -18,6 +18,9 @@ import traceback
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
+import pytest
+from undrawn import draw_nothing
+
 IMPORTED = """
     gmsh h5py matplotlib.backends.backend_agg matplotlib.figure PIL.Image pxr.UsdGeom pxr.UsdLux pxr.UsdShade
     scipy.integrate scipy.signal scipy.sparse.csgraph warp warp_mca.accuracy.tradeoff warp_mca.cli.main
@@ -37,7 +40,6 @@ with socket.socket(socket.AF_UNIX) as server:
     status = server.recv(1)
 sys.exit(status[0] if status else 70)
 """
-PNG = b"\x89PNG\r\n\x1a\n"  # how such a file begins
 Plan = Callable[[list[str]], tuple[list[str] | None, int]]
 
 
@@ -84,18 +86,9 @@ def _prepare() -> None:
     load_rerun()
     warp.config.log_level = warp.LOG_WARNING
     mca.run(mca.make_scene("two_link"), refine=0.35, duration=1e-6, device="cpu", threads=1)  # loads its kernels
-    _draw_nothing()
+    draw_nothing(pytest.MonkeyPatch())
     tradeoff = sys.modules["warp_mca.accuracy.tradeoff"]
     tradeoff.one_at_a_time = lambda scene: one_at_a_time(scene)[:2]  # variants
-
-
-def _draw_nothing() -> None:
-    """Figures of a run are made, but neither laid out nor drawn, which takes longer than the run itself."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.layout_engine import ConstrainedLayoutEngine
-
-    ConstrainedLayoutEngine.execute = lambda self, figure: None
-    FigureCanvasAgg.print_png = lambda self, path, **options: Path(path).write_bytes(PNG)
 
 
 def _answer(client: socket.socket, plan: Plan) -> None:

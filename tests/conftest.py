@@ -1,4 +1,4 @@
-"""Owns what all tests share: threads, the skip of tests marked `gpu`, registrations that end with a test, no figures."""
+"""Owns what all tests share: threads, the skip of tests marked `gpu`, fixtures."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import pytest
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: its threads wait for cores that other tests use
 
-from flying_bars import FlyingBars  # noqa: E402
+from flying_bars import FlyingBars
+from undrawn import draw_nothing
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -46,6 +47,5 @@ def bars() -> FlyingBars:
 
 @pytest.fixture
 def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Drawing the figures of results takes longer than the runs."""
-    for figure in ("force_figure.save_forces", "energy_figure.save_energies"):
-        monkeypatch.setattr(f"warp_mca.results.{figure}", lambda *_: None)
+    """Figures are made, but not drawn."""
+    draw_nothing(monkeypatch)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from impacts import begun, finished, result_of
+from undrawn import draw_nothing
 
 import warp_mca as mca
 from warp_mca.base import outside
@@ -63,8 +64,7 @@ def own_law(monkeypatch: pytest.MonkeyPatch, folder: Path, file: str, table: dic
         file: of the test. table, kind: where the class that the file registers stands, and its name.
         script: what follows the import of `own_law` in block.py.
     """
-    for figure in ("warp_mca.results.force_figure.save_forces", "warp_mca.results.energy_figure.save_energies"):
-        monkeypatch.setattr(figure, lambda *_: None)
+    draw_nothing(monkeypatch)
     monkeypatch.chdir(folder)
     monkeypatch.setattr(sys, "path", list(sys.path))
     monkeypatch.setattr(outside, "_IMPORTED", {})

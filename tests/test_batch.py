@@ -14,6 +14,8 @@ from warp_mca.physics.elements.patches import make_patches
 from warp_mca.results.storage import ALL_FILES, PROBE_FILES
 from warp_mca.studies.batch import check_alike
 
+pytestmark = pytest.mark.usefixtures("no_figures")
+
 
 def hinged(
     E: float = 70e9,

@@ -21,6 +21,8 @@ from warp_mca.phases.every import Every
 from warp_mca.phases.impact import Impact
 from warp_mca.step.records import SceneRecords
 
+pytestmark = pytest.mark.usefixtures("no_figures")
+
 BLOCK = mca.Body(
     name="block",
     geometry=mca.Box(size=(0.01, 0.01, 0.01), divisions=(2, 2, 2)),
@@ -37,13 +39,6 @@ LANDING = mca.Scene(
 
 class StoppedError(Exception):
     pass
-
-
-@pytest.fixture(autouse=True)
-def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Drawing them takes longer than the runs."""
-    for figure in ("warp_mca.results.force_figure.save_forces", "warp_mca.results.energy_figure.save_energies"):
-        monkeypatch.setattr(figure, lambda *_: None)
 
 
 @pytest.fixture

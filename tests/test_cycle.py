@@ -18,6 +18,8 @@ from warp_mca.phases.settings import Settings
 from warp_mca.rigid.handback import HandBack
 from warp_mca.step.state_figures import max_plastic_strain
 
+pytestmark = pytest.mark.usefixtures("no_figures")
+
 COARSE = {
     "section": 2,
     "ring": 1,

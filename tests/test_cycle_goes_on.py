@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -50,53 +49,30 @@ class StoppedError(Exception):
 
 
 @pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An empty folder with the scene, and no figures, which take longer than the runs."""
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, no_figures: None) -> None:
+    """An empty folder with the scene."""
     (tmp_path / "scene.py").write_text(SCENE, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    for figure in ("warp_mca.results.force_figure.save_forces", "warp_mca.results.energy_figure.save_energies"):
-        monkeypatch.setattr(figure, lambda *_: None)
 
 
 def scene() -> mca.Scene:
     return mca.make_scene("single_link", t_end=0.5, **COARSE)
 
 
-@cache
-def whole() -> mca.Result:
-    """A run that was never interrupted."""
-    return mca.run(scene(), duration=1.5e-3, threads=1)
-
-
-def equal(result: mca.Result) -> None:
-    """What was interrupted is the same as what was not, but for the time that it took."""
-    expected = whole()
-    assert all(result[name].tobytes() == expected[name].tobytes() for name in expected.history)
-    assert np.array_equal(result.contacts[0].force, expected.contacts[0].force)
-    for name, value in json.loads(json.dumps(expected.summary)).items():
-        if name not in ("wall", "element_steps_per_s", "parameters"):
-            assert result.summary[name] == value, name
-
-
-def test_a_run_that_is_killed_within_an_impact_goes_on():
+def test_a_run_that_is_stopped_again_and_again_goes_on_to_the_same_bits(monkeypatch: pytest.MonkeyPatch):
+    """Killed within an impact, stopped within the swing behind it and within the next impact."""
     paths = os.pathsep.join(filter(None, sys.path))
     done = subprocess.run([sys.executable, "-c", KILLED, *COMMAND], env=os.environ | {"PYTHONPATH": paths}, check=False)
     assert done.returncode == -signal.SIGKILL
     assert [file.name for file in Path("out").iterdir()] == [FILE]
-    assert main(["resume", "out"]) == 0
-    assert not [file for file in Path("out").iterdir() if "checkpoint" in file.name]
-    equal(mca.load("out"))
 
-
-def test_a_run_that_is_stopped_within_a_swing_and_within_the_next_impact_goes_on(monkeypatch: pytest.MonkeyPatch):
     def stop(*_: Any) -> None:
         raise StoppedError
 
-    arguments = {"duration": 1.5e-3, "threads": 1, "checkpoint": "1e-4s", "out": "out"}
     with monkeypatch.context() as patch:
         patch.setattr(SwingDriver, "run", stop)  # the first swing is another function
         with pytest.raises(StoppedError):
-            mca.run(scene(), **arguments)
+            main(["resume", "out"])
     assert [file.name for file in Path("out").iterdir()] == [ENDED.format(1)]
 
     places, store = [], Checkpoint.store
@@ -110,10 +86,17 @@ def test_a_run_that_is_stopped_within_a_swing_and_within_the_next_impact_goes_on
     with monkeypatch.context() as patch:
         patch.setattr(Checkpoint, "store", store_and_stop)
         with pytest.raises(StoppedError):
-            mca.run(scene(), **arguments)
+            main(COMMAND)
     assert places == 2 * [{"impact": 2}]
     assert sorted(file.name for file in Path("out").iterdir()) == [ENDED.format(1), FILE]
     with pytest.raises(mca.RequestError, match="another request"):
-        mca.run(scene(), **{**arguments, "precision": "float64"})
-    equal(mca.run(scene(), **arguments))
+        mca.run(scene(), duration=1.5e-3, threads=1, checkpoint="2e-4s", out="out", precision="float64")
+    assert main(["resume", "out"]) == 0
     assert not [file for file in Path("out").iterdir() if "checkpoint" in file.name]
+
+    result, expected = mca.load("out"), mca.run(scene(), duration=1.5e-3, threads=1)
+    assert all(result[name].tobytes() == expected[name].tobytes() for name in expected.history)
+    assert np.array_equal(result.contacts[0].force, expected.contacts[0].force)
+    for name, value in json.loads(json.dumps(expected.summary)).items():
+        if name not in ("wall", "element_steps_per_s", "parameters"):
+            assert result.summary[name] == value, name

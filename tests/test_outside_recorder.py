@@ -63,10 +63,8 @@ def build(rates: bool = False) -> mca.Scene:
 
 
 @pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A folder with the recorder as the module `mine`, and a scene file; figures take longer than the runs."""
-    for figure in ("warp_mca.results.force_figure.save_forces", "warp_mca.results.energy_figure.save_energies"):
-        monkeypatch.setattr(figure, lambda *_: None)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, no_figures: None) -> None:
+    """A folder with the recorder as the module `mine`, and a scene file."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", list(sys.path))
     monkeypatch.setattr(outside, "_IMPORTED", {})

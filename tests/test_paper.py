@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from undrawn import draw_nothing
 
 from benchmarks.measurements import FOLDER
 from warp_mca.base.errors import RequestError
@@ -60,6 +61,7 @@ def runs_of(level: studies.Level) -> Runs:
 def report_of(level: studies.Level, out: Path, deadline: float = math.inf) -> Report:
     """A report on runs of the study of friction that end after 10 us."""
     with pytest.MonkeyPatch.context() as patch:
+        draw_nothing(patch)
         patch.setitem(STUDIES, "mu", replace(STUDIES["mu"], common=(("duration", 10e-6),)))
         return make_report(level, out, workers=1, deadline=deadline)
 

@@ -270,9 +270,8 @@ def test_a_rigid_body_carries_its_probes():
     assert np.linalg.norm(found.acceleration[5:-5], axis=1) == pytest.approx(0.05 * spin**2, rel=1e-3)
 
 
-def test_results_are_written_and_read_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    for figure in ("warp_mca.results.force_figure.save_forces", "warp_mca.results.energy_figure.save_energies"):
-        monkeypatch.setattr(figure, lambda *_: None)  # drawing them takes longer than the run
+@pytest.mark.usefixtures("no_figures")
+def test_results_are_written_and_read_back(tmp_path: Path):
     scene = watched(oblique())
     result = mca.run(scene, out=tmp_path / "out", threads=1)
     loaded = mca.load(tmp_path / "out")

@@ -60,13 +60,11 @@ main(sys.argv[1:])
 
 
 @pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, no_figures: None) -> None:
     """An empty folder with the scene, and blocks so short that a swing has several."""
     (tmp_path / "scene.py").write_text(SCENE, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(flexible_swing, "BLOCK", BLOCK)
-    for figure in ("warp_mca.results.force_figure.save_forces", "warp_mca.results.energy_figure.save_energies"):
-        monkeypatch.setattr(figure, lambda *_: None)  # drawing them takes longer than the runs
 
 
 @cache

@@ -15,6 +15,8 @@ from warp_mca.geometry.refinement import refined_count
 from warp_mca.phases.meshing import mesh
 from warp_mca.scene import catalogue, model_file
 
+pytestmark = pytest.mark.usefixtures("no_figures")
+
 FACTORS = (0.5, 0.7, 1.3, 2.0)
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
 FINISHED = ("graded_bars", "stick_slip", "strained_element", "two_metal_bar")  # their bodies are meshes, no recipes

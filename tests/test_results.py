@@ -24,6 +24,8 @@ from warp_mca.results.force_history import (
 from warp_mca.results.result import HISTORY_COLUMNS, Result, summarise
 from warp_mca.results.storage import FILES, check_output, load, save
 
+pytestmark = pytest.mark.usefixtures("no_figures")
+
 TIME = np.arange(1, 601) * 1e-6
 
 

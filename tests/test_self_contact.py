@@ -39,10 +39,9 @@ def test_a_strip_folds_on_itself() -> None:
     assert result.summary["energy_error"] < BALANCE
 
 
-@pytest.mark.parametrize("around", [0, 3], ids=["strip", "tube"])
-def test_eight_folds_are_pressed_on_each_other(around) -> None:
-    mesh = folded(arms=9, arm=0.003, bend=0.9e-3, cell=0.6e-3, around=around, radius=0.006)
-    scene = press(mesh, (FOLDED,), 2.45e-4, 30.0, ("z", "x") if around else ("z", "z"))
+def test_eight_folds_are_pressed_on_each_other() -> None:
+    mesh = folded(arms=9, arm=0.003, bend=0.9e-3, cell=0.6e-3, around=3, radius=0.006)
+    scene = press(mesh, (FOLDED,), 2.45e-4, 30.0, ("z", "x"))
     impact = finished(scene)
     item, spring = impact.solver.model.passes[0], impact.state.contacts[0].spring
     touched = np.repeat(item.slave, item.sides)[spring.depth.numpy() > 0.0]

@@ -16,6 +16,8 @@ from warp_mca.phases import carry_out
 from warp_mca.phases.checkpoint import FILE, Checkpoint
 from warp_mca.scene import model_file
 
+pytestmark = pytest.mark.usefixtures("no_figures")
+
 SOFT = mca.Elastic(E=1e9, nu=0.3, rho=1e3)
 SIDE, GAP, SPEED, G = 0.02, 5e-4, 1.0, 9.81
 WEIGHT = SIDE**3 * 1e3 * G

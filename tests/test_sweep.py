@@ -12,6 +12,8 @@ import warp_mca as mca
 from warp_mca.cli.main import main
 from warp_mca.studies.sweep_plan import parse_grid
 
+pytestmark = pytest.mark.usefixtures("no_figures")
+
 
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:

@@ -26,6 +26,8 @@ from warp_mca.studies.sweep_lines import read_lines
 from warp_mca.studies.sweep_plan import FULL, Plan, RunOptions, batches, differing
 from warp_mca.studies.sweep_workers import WorkerDied, Workers
 
+pytestmark = pytest.mark.usefixtures("no_figures")
+
 SPEEDS = (1.0, 1.5, 2.0, 2.5, 3.0)
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from undrawn import draw_nothing
 
 import warp_mca as mca
 from warp_mca.base.errors import RequestError
@@ -51,8 +52,7 @@ def no_pictures() -> Iterator[None]:
     """Drawing takes longer than the runs; blocks are so short that the swing has several."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(flexible_swing, "BLOCK", 2)
-        for figure in ("force_figure.save_forces", "energy_figure.save_energies"):
-            patch.setattr(f"warp_mca.results.{figure}", lambda *_: None)
+        draw_nothing(patch)
         yield
 
 
