@@ -49,3 +49,12 @@ def bars() -> FlyingBars:
 def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures are made, but not drawn."""
     draw_nothing(monkeypatch)
+
+
+@pytest.fixture
+def short_ranges(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ranges that threads can cut small models in."""
+    from impacts import SHORT_RANGES
+
+    for name, length in SHORT_RANGES.items():
+        monkeypatch.setattr(name, length)

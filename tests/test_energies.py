@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca.results.energy_figure import plot_energies, save_energies
+from warp_mca.results.energy_figure import plot_energies
 from warp_mca.results.figure_style import engineering
 from warp_mca.results.result import HISTORY_COLUMNS, Result
 
@@ -39,10 +39,6 @@ def test_energy_that_sides_absorbed_is_drawn_where_there_are_such_sides():
     absorbing = replace(plain, history=plain.history | {"E_absorbed": plain["E_friction"]})
     drawn = [{line.get_label() for line in plot_energies(item).axes[0].lines} for item in (plain, absorbing)]
     assert drawn[1] - drawn[0] == {"absorbed by sides"} and not drawn[0] - drawn[1]
-
-
-def test_file_is_a_png(tmp_path):
-    assert save_energies(tmp_path / "energies.png", result()).read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from test_energies import TIME, result
 
 from warp_mca.pictures.snapshot import Look, Skin, plot_snapshot, save_snapshot
 from warp_mca.recorders.colours import PALETTE, ColourScale, levels, packed
@@ -13,10 +14,9 @@ from warp_mca.results.energy_figure import plot_energies, save_energies
 from warp_mca.results.figure_style import engineering
 from warp_mca.results.path_figures import plot_paths, plot_waves, save_path_figures
 from warp_mca.results.paths import PathHistory
-from warp_mca.results.result import HISTORY_COLUMNS, Result
+from warp_mca.results.result import Result
 from warp_mca.scene.materials import Elastic
 
-TIME = np.arange(1, 401) * 1e-6
 ALUMINIUM = Elastic(E=70e9, nu=0.27, rho=2700.0)
 
 
@@ -25,14 +25,6 @@ def assert_png(path: Path) -> None:
     content = path.read_bytes()
     assert content.startswith(b"\x89PNG")
     assert 10_000 < len(content) < 500_000
-
-
-def result() -> Result:
-    """2 J of kinetic energy, half of which turns into elastic energy, friction and plastic work in equal parts."""
-    share = np.clip(TIME / TIME[-1], 0.0, 1.0) / 3.0
-    energy = {"E_kinetic": 2.0 - 3.0 * share, "E_internal": 2.0 * share, "E_plastic": share, "E_friction": share}
-    history = {name: np.zeros(len(TIME)) for name in HISTORY_COLUMNS} | {"time_s": TIME} | energy
-    return Result({"scene": "toy"}, history | {"E_total_error": 1e-6 * share})
 
 
 def pulse(speed: float, name: str = "Path 2") -> PathHistory:

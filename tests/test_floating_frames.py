@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from impacts import SHORT_RANGES, begun, prepared
+from impacts import begun, prepared
 from scipy.spatial.transform import Rotation
 from test_architecture import everything
 from test_multi_rate import graded
@@ -114,10 +114,8 @@ def hinged() -> mca.Scene:
     )
 
 
-def test_runs_repeat_bit_for_bit(monkeypatch, tmp_path):
+def test_runs_repeat_bit_for_bit(short_ranges, tmp_path):
     """By two threads, in a batch, and by a state that is read back; frames have turned with their bodies then."""
-    for name, length in SHORT_RANGES.items():
-        monkeypatch.setattr(name, length)
     whole, first, rest = (begun(hinged()) for _ in range(3))
     threads, batch = begun(hinged(), threads=2), begun(hinged(), hinged())
     assert threads.solver.threads == 2

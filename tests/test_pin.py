@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from chains import BASE, TORQUE, impact, motion_at_end, ready, rigid_end
 from chains import bars as bars_in_a_row
-from impacts import SHORT_RANGES, finished, momentum, prepared, result_of
+from impacts import finished, momentum, prepared, result_of
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipj, ellipk
 from test_cycle import scene as cycling
@@ -143,9 +143,7 @@ def test_a_stored_state_with_pins_goes_on_to_the_same_bits(tmp_path):
     assert np.abs(whole.state.couplings.orientation.numpy()[..., 2]).max() > 1e-3
 
 
-def test_threads_give_the_same_bits_with_pins(monkeypatch):
-    for name, length in SHORT_RANGES.items():
-        monkeypatch.setattr(name, length)
+def test_threads_give_the_same_bits_with_pins(short_ranges):
     one, two = (impact(pinned(elements=40), threads=threads) for threads in (1, 2))
     assert two.solver.threads == 2
     for found in (one, two):

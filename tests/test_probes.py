@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from impacts import SHORT_RANGES, begun, result_of
+from impacts import begun, result_of
 from test_floating_frames import bar as spinning_bar
 from test_floating_frames import set_spinning
 from test_gpu import oblique
@@ -225,9 +225,7 @@ def equal(one: mca.Result, two: mca.Result) -> bool:
     return all(np.array_equal(a, b) for x, y in zip(*arrays, strict=True) for a, b in zip(x, y, strict=True))
 
 
-def test_batches_threads_and_stored_states_give_the_same_bits(monkeypatch, tmp_path):
-    for name, length in SHORT_RANGES.items():
-        monkeypatch.setattr(name, length)
+def test_batches_threads_and_stored_states_give_the_same_bits(short_ranges, tmp_path):
     whole, first, rest = (begun(watched(oblique())) for _ in range(3))
     threads, batch = begun(watched(oblique()), threads=2), begun(oblique(), watched(oblique()))
     assert threads.solver.threads == 2

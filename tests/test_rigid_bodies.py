@@ -9,7 +9,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from impacts import SHORT_RANGES, begun, figures, finished, result_of
+from impacts import begun, figures, finished, result_of
 from numpy.typing import NDArray
 from test_cycle import COARSE
 
@@ -20,15 +20,11 @@ from warp_mca.phases.prepare import Request
 from warp_mca.phases.settings import Settings
 from warp_mca.physics.rigid.rows import independent
 
+pytestmark = pytest.mark.usefixtures("short_ranges")
+
 SOFT = mca.Elastic(E=1e9, nu=0.3, rho=2700.0)
 ROUND_OFF = 1e-12
 BAR = mca.Box(size=(0.3, 0.04, 0.04), divisions=(6, 4, 4), origin=(0.0, -0.02, -0.02))
-
-
-@pytest.fixture(autouse=True)
-def short_ranges(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, length in SHORT_RANGES.items():
-        monkeypatch.setattr(name, length)
 
 
 def momenta(impact: Impact) -> tuple[NDArray, float]:

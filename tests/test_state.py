@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import warp as wp
-from impacts import SHORT_RANGES, begun, figures
+from impacts import begun, figures
 from test_batch import hinged
 from test_style import entries
 
@@ -35,13 +35,9 @@ from warp_mca.step.records import SceneRecords
 from warp_mca.step.state import State
 from warp_mca.step.state_figures import max_speed
 
+pytestmark = pytest.mark.usefixtures("short_ranges")
+
 PRECISIONS = ["mixed", "float64"]
-
-
-@pytest.fixture(autouse=True)
-def short_ranges(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, length in SHORT_RANGES.items():
-        monkeypatch.setattr(name, length)
 
 
 def scene(**change: object) -> mca.Scene:

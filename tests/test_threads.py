@@ -7,18 +7,12 @@ import threading
 import numpy as np
 import pytest
 import warp as wp
-from impacts import SHORT_RANGES
 
 import warp_mca as mca
 from warp_mca.cli.main import main
 from warp_mca.step import solver, threads
 
-
-@pytest.fixture(autouse=True)
-def short_ranges(monkeypatch):
-    """Ranges that small models can be cut in."""
-    for name, length in SHORT_RANGES.items():
-        monkeypatch.setattr(name, length)
+pytestmark = pytest.mark.usefixtures("short_ranges")
 
 
 def scene(element: str = "hex8", **impact: float | None) -> mca.Scene:
