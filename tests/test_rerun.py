@@ -5,10 +5,8 @@ from __future__ import annotations
 import dataclasses
 import os
 import shutil
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -96,27 +94,6 @@ def test_the_file_passes_rerun_s_own_check(recording: Path):
     command = [sys.executable, "-m", "rerun_cli", "rrd", "verify", str(recording)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert "verified without error" in done.stdout + done.stderr
-
-
-def test_a_killed_run_leaves_every_flushed_frame(tmp_path: Path, bars: FlyingBars):
-    import multiprocessing
-
-    file = tmp_path / "killed.rrd"
-
-    def run() -> None:
-        recorder = RerunStream(file)
-        recorder.start(bars.info)
-        for index in range(FRAMES):
-            recorder.frame(bars.frame(index))
-        time.sleep(0.5)  # the recorder does not wait for the disk
-        os.kill(os.getpid(), signal.SIGKILL)
-
-    process = multiprocessing.get_context("fork").Process(target=run)
-    process.start()
-    process.join(60)
-    assert process.exitcode == -signal.SIGKILL
-    flushed = FRAMES - FRAMES % rerun_stream.FLUSH_EVERY
-    assert len(list(rows(file, "/world/lower", "Mesh3D:vertex_positions"))) >= flushed
 
 
 def test_a_file_that_cannot_be_written_is_refused_before_the_run(tmp_path: Path):
