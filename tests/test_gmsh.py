@@ -28,6 +28,7 @@ from warp_mca.geometry import Rod
 def masks():
     return [line for line in open("/proc/self/status") if line.startswith(("SigIgn", "SigCgt"))]
 signal.signal(signal.SIGTERM, lambda number, frame: print("caught"))
+threading.Thread(target=int).start()  # from the first one on, the C library has a signal of its own
 before = masks()
 task = threading.Thread(target=Rod(radius=0.01, length=0.1).build)
 if sys.argv[1] == "main":
