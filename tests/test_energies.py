@@ -9,7 +9,6 @@ import pytest
 
 import warp_mca as mca
 from warp_mca.results.energy_figure import plot_energies
-from warp_mca.results.figure_style import engineering
 from warp_mca.results.result import HISTORY_COLUMNS, Result
 
 TIME = np.arange(1, 401) * 1e-6
@@ -39,13 +38,6 @@ def test_energy_that_sides_absorbed_is_drawn_where_there_are_such_sides():
     absorbing = replace(plain, history=plain.history | {"E_absorbed": plain["E_friction"]})
     drawn = [{line.get_label() for line in plot_energies(item).axes[0].lines} for item in (plain, absorbing)]
     assert drawn[1] - drawn[0] == {"absorbed by sides"} and not drawn[0] - drawn[1]
-
-
-@pytest.mark.parametrize(
-    ("greatest", "expected"), [(2e3, (1e-3, "kN")), (30.0, (1.0, "N")), (2e-3, (1e3, "mN")), (0.0, (1.0, "N"))]
-)
-def test_units_suit_the_greatest_value(greatest, expected):
-    assert engineering(greatest, "N") == expected
 
 
 def test_a_free_body_that_turns_is_sent_to_float64_only_by_a_guard():
