@@ -22,17 +22,6 @@ def result() -> Result:
     return Result({"scene": "toy"}, history | {"E_total_error": 1e-6 * share})
 
 
-def test_energies_are_drawn_in_a_fitting_unit_and_split_into_elastic_and_plastic():
-    energies, balance = plot_energies(result()).axes
-    assert energies.get_ylabel() == "energy [mJ]"
-    assert balance.get_ylabel() == "error [µJ]"
-    assert balance.get_xlabel() == "time after first contact [ms]"
-    last = {line.get_label(): line.get_ydata()[-1] for line in energies.lines}
-    assert last["elastic"] == pytest.approx(1e3 / 3.0)
-    assert last["plastic work"] == pytest.approx(1e3 / 3.0)
-    assert last["kinetic, change"] == pytest.approx(-1e3, rel=0.01)
-
-
 def test_energy_that_sides_absorbed_is_drawn_where_there_are_such_sides():
     plain = result()
     absorbing = replace(plain, history=plain.history | {"E_absorbed": plain["E_friction"]})
