@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -55,6 +57,28 @@ def goes_on(scene: mca.Scene, folder: Path, device: str = "cpu") -> None:
 def same(one: mca.Result, other: mca.Result) -> bool:
     """Whether two histories have the same bits."""
     return all(np.array_equal(one[name], other[name], equal_nan=True) for name in other.history)
+
+
+def striking(box: mca.Mesh, material: Any, speed: float, **bar: Any) -> mca.Scene:
+    """A bar of 20 x 5 x 5 mm flies along x against a rigid block and yields there; its cells grow along x.
+
+    `box` has it in even cells from the origin, `bar` has other fields of its body.
+    """
+    points = box.points.copy()
+    points[:, 0] = 0.02 * (1.0 - (1.0 - points[:, 0] / 0.02) ** 2)
+    body = {"geometry": replace(box, points=points), "material": material, "velocity": (speed, 0.0, 0.0)}
+    block = mca.Box(size=(0.01, 0.01, 0.01), divisions=(2, 2, 2), origin=(0.02, -0.0025, -0.0025))
+    steel = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
+    slave, master = mca.Surface(body="bar", nodes="xmax"), mca.Surface(body="block", nodes="xmin")
+    return mca.Scene(
+        name="striking",
+        bodies=(
+            mca.Body(name="bar", **body, **bar),
+            mca.Body(name="block", geometry=block, material=steel, rigid=True),
+        ),
+        contacts=(mca.Contact(slave=slave, master=master, penalty=0.05),),
+        impact=mca.ImpactPhase(duration=1e-5, output_interval=1e-6, time_step_scale=0.2),
+    )
 
 
 def own_law(monkeypatch: pytest.MonkeyPatch, folder: Path, file: str, table: dict, kind: str, script: str) -> str:

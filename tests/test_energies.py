@@ -9,7 +9,6 @@ import pytest
 
 import warp_mca as mca
 from warp_mca.results.energy_figure import plot_energies
-from warp_mca.results.figure_style import engineering
 from warp_mca.results.result import HISTORY_COLUMNS, Result
 
 TIME = np.arange(1, 401) * 1e-6
@@ -23,29 +22,11 @@ def result() -> Result:
     return Result({"scene": "toy"}, history | {"E_total_error": 1e-6 * share})
 
 
-def test_energies_are_drawn_in_a_fitting_unit_and_split_into_elastic_and_plastic():
-    energies, balance = plot_energies(result()).axes
-    assert energies.get_ylabel() == "energy [mJ]"
-    assert balance.get_ylabel() == "error [µJ]"
-    assert balance.get_xlabel() == "time after first contact [ms]"
-    last = {line.get_label(): line.get_ydata()[-1] for line in energies.lines}
-    assert last["elastic"] == pytest.approx(1e3 / 3.0)
-    assert last["plastic work"] == pytest.approx(1e3 / 3.0)
-    assert last["kinetic, change"] == pytest.approx(-1e3, rel=0.01)
-
-
 def test_energy_that_sides_absorbed_is_drawn_where_there_are_such_sides():
     plain = result()
     absorbing = replace(plain, history=plain.history | {"E_absorbed": plain["E_friction"]})
     drawn = [{line.get_label() for line in plot_energies(item).axes[0].lines} for item in (plain, absorbing)]
     assert drawn[1] - drawn[0] == {"absorbed by sides"} and not drawn[0] - drawn[1]
-
-
-@pytest.mark.parametrize(
-    ("greatest", "expected"), [(2e3, (1e-3, "kN")), (30.0, (1.0, "N")), (2e-3, (1e3, "mN")), (0.0, (1.0, "N"))]
-)
-def test_units_suit_the_greatest_value(greatest, expected):
-    assert engineering(greatest, "N") == expected
 
 
 def test_a_free_body_that_turns_is_sent_to_float64_only_by_a_guard():

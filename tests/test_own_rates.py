@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 import warp as wp
-from outside import holds_up
+from outside import holds_up, striking
 from test_own_element import registered as linear_tets  # noqa: F401 (the plain tetrahedron of the user's own)
 
 import warp_mca as mca
@@ -156,36 +156,18 @@ def test_the_flow_stress_in_simple_shear_is_that_of_the_rate(rate: float, device
         assert result.summary["energy_error"] < 1e-4
 
 
-def striking(element: str, material: mca.Elastic | None = None) -> mca.Scene:
-    """A bar flies along x against a rigid block and flows where it strikes it; its cells grow along x."""
+def bar(element: str, material: mca.Elastic | None = None) -> mca.Scene:
+    """A bar of the steel, which flows where it strikes."""
     box = mca.Box(size=(0.02, 0.005, 0.005), divisions=(6, 2, 2)).build()
-    x = box.points[:, 0] / 0.02
-    box.points[:, 0] = 0.02 * (1.0 - (1.0 - x) ** 2)
-    block = mca.Box(size=(0.01, 0.01, 0.01), divisions=(2, 2, 2), origin=(0.02, -0.0025, -0.0025))
-    bar = {"geometry": box, "material": material or STEEL, "element": element, "velocity": (20.0, 0.0, 0.0)}
-    return mca.Scene(
-        name="striking",
-        bodies=(
-            mca.Body(name="bar", **bar),
-            mca.Body(name="block", geometry=block, material=mca.Elastic(E=210e9, nu=0.3, rho=7850.0), rigid=True),
-        ),
-        contacts=(
-            mca.Contact(
-                slave=mca.Surface(body="bar", nodes="xmax"),
-                master=mca.Surface(body="block", nodes="xmin"),
-                penalty=0.05,
-            ),
-        ),
-        impact=mca.ImpactPhase(duration=1e-5, output_interval=1e-6, time_step_scale=0.2),
-    )
+    return striking(box, material or STEEL, 20.0, element=element)
 
 
 @pytest.mark.parametrize("device", DEVICES)
 def test_a_bar_flows_where_it_strikes_a_rigid_block(device: str, tmp_path: Path):
-    result = holds_up(striking("hex8"), device, tmp_path)
+    result = holds_up(bar("hex8"), device, tmp_path)
     assert result.summary["max_plastic_strain"] > 1e-3 and result["E_plastic"][-1] > 0.05 * result["E_kinetic"][0]
 
 
 def test_an_element_with_nodal_pressure_is_refused():
     with pytest.raises(mca.RequestError, match=r"Body\.element = 'tet4': its law gives the pressure"):
-        mca.run(striking("tet4"))
+        mca.run(bar("tet4"))

@@ -14,8 +14,8 @@ import h5py
 import numpy as np
 import pytest
 import warp as wp
-from outside import holds_up
-from test_elements import STEEL, held_of
+from outside import holds_up, striking
+from test_elements import held_of
 
 import warp_mca as mca
 from warp_mca.geometry.cell_types import HEXAHEDRON, TETRA10
@@ -107,35 +107,18 @@ def test_forces_are_those_of_tet10(kinematics: str):
     np.testing.assert_allclose(own.forces(u), expected, atol=tolerance * np.abs(expected).max())
 
 
-def striking(element: str = "own_tet10") -> mca.Scene:
-    """A bar of ten-node tetrahedra strikes a rigid block, and yields there."""
+def metal_bar(element: str) -> mca.Scene:
+    """A bar of few cells, which yields where it strikes."""
     metal = mca.J2Bilinear(E=70e9, nu=0.3, rho=2700.0, sigma_y=100e6, E_t=7e9, beta=0.3)
     box = mca.Box(size=(0.02, 0.005, 0.005), divisions=(4, 1, 1)).build()
-    x = box.points[:, 0] / 0.02
-    box.points[:, 0] = 0.02 * (1.0 - (1.0 - x) ** 2)
-    block = mca.Box(size=(0.01, 0.01, 0.01), divisions=(2, 2, 2), origin=(0.02, -0.0025, -0.0025))
-    bar = {"geometry": box, "material": metal, "element": element, "velocity": (10.0, 0.0, 0.0)}
-    return mca.Scene(
-        name="striking",
-        bodies=(
-            mca.Body(name="bar", kinematics="finite", **bar),
-            mca.Body(name="block", geometry=block, material=STEEL, rigid=True),
-        ),
-        contacts=(
-            mca.Contact(
-                slave=mca.Surface(body="bar", nodes="xmax"),
-                master=mca.Surface(body="block", nodes="xmin"),
-                penalty=0.05,
-            ),
-        ),
-        impact=mca.ImpactPhase(duration=1e-5, output_interval=1e-6, time_step_scale=0.2),
-    )
+    return striking(box, metal, 10.0, element=element, kinematics="finite")
 
 
 @pytest.mark.parametrize("device", ["cpu", pytest.param("cuda:0", marks=pytest.mark.gpu)])
 def test_a_bar_strikes_a_rigid_block_and_is_shown_with_all_its_nodes(device: str, tmp_path: Path):
-    result = holds_up(striking(), device, tmp_path)
+    scene = metal_bar("own_tet10")
+    result = holds_up(scene, device, tmp_path)
     assert result.summary["max_plastic_strain"] > 1e-4
-    mca.run(striking(), device=device, recorders=(VtkHdfFile(tmp_path / "bar.vtkhdf"),))
+    mca.run(scene, device=device, recorders=(VtkHdfFile(tmp_path / "bar.vtkhdf"),))
     with h5py.File(tmp_path / "bar.vtkhdf") as file:
         assert set(file["VTKHDF/Types"][:]) == {CELL.vtk, HEXAHEDRON.vtk}

@@ -14,7 +14,7 @@ from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 from statics import Static
 from test_elements import STEEL, cut, energy, held_of
-from test_own_ten_nodes import striking
+from test_own_ten_nodes import metal_bar
 
 import warp_mca as mca
 from warp_mca.geometry import tetra10
@@ -381,5 +381,5 @@ def test_springs_of_faces_are_those_of_linear_cells_of_half_the_size():
 
 
 def test_it_strikes_and_holds_up_as_elements_do(tmp_path: Path):
-    result = holds_up(striking("tet10"), "cpu", tmp_path)
+    result = holds_up(metal_bar("tet10"), "cpu", tmp_path)
     assert result.summary["max_plastic_strain"] > 1e-4
