@@ -65,7 +65,7 @@ def add_flush(
         return
     flush, behind = np.zeros(len(item.slave), dtype=int), []
     for p in range(stage.sides):
-        number = np.flatnonzero(item.side == p)
+        number = np.flatnonzero(item.side == p).astype(np.int32)
         if not len(number):
             continue
         which, found, opposed = nearest_of_side(X, item.slave, item.slave_face, X, item.face, number)

@@ -92,7 +92,7 @@ def ringing(c: Finished, times: float) -> Iterator[Values]:
     "{name} creeps at {speed:.2g} m/s, though friction there is {share:.0%} of what holds it: nodes whose springs open "
     "for a few steps lose their grip and slide when they close; a body that should rest moves so far, and friction "
     "takes that work;",
-    "a lower penalty or a shorter time step lessens it",
+    "leave the contact's law out, so that it has a dashpot at rest, or settle the bodies first: phases=(mca.Settle(),)",
     30.0,
     "times the creep at most; a body that moved further slid, or rolls with a creep of less than a hundredth",
 )

@@ -78,9 +78,11 @@ def places(contact: Contact, meshes: Mapping[str, Mesh], X: Mapping[str, Array])
     faces, _ = meshes[contact.master.body].surface(contact.master.nodes)
     x, points, nodes = X[contact.slave.body], X[contact.master.body], np.unique(own)
     side, best = find_sides(faces, normals(points, faces)), np.full(len(nodes), math.inf)
-    face, weight, edge = np.zeros(len(nodes), int), np.zeros((len(nodes), 4)), np.zeros(len(nodes))
+    face, weight, edge = np.zeros(len(nodes), np.int32), np.zeros((len(nodes), 4)), np.zeros(len(nodes))
     for p in range(side.max(initial=0) + 1):
-        which, found, opposed = nearest_of_side(x, nodes, own, points, faces, np.flatnonzero(side == p))
+        which, found, opposed = nearest_of_side(
+            x, nodes, own, points, faces, np.flatnonzero(side == p).astype(np.int32)
+        )
         corner = points[faces[which]]
         longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
         near = (
@@ -92,7 +94,7 @@ def places(contact: Contact, meshes: Mapping[str, Mesh], X: Mapping[str, Array])
     if not glued.any():
         remedy = "no slave node lies on the master's faces at the start; let the surfaces meet, or raise gap"
         raise bad_value(f"Contact {'–'.join(contact.sides)}: Bond.gap", contact.bond.gap, remedy)
-    return Place(*(value[glued] for value in (nodes, face, weight, edge)))
+    return Place(nodes[glued], face[glued], weight[glued], edge[glued])
 
 
 def normals(X: Array, face: Index) -> Array:
