@@ -156,10 +156,10 @@ def test_the_flow_stress_in_simple_shear_is_that_of_the_rate(rate: float, device
         assert result.summary["energy_error"] < 1e-4
 
 
-def bar(element: str, material: mca.Elastic | None = None) -> mca.Scene:
+def bar(element: str, material: mca.Elastic | None = None, speed: float = 20.0) -> mca.Scene:
     """A bar of the steel, which flows where it strikes."""
     box = mca.Box(size=(0.02, 0.005, 0.005), divisions=(6, 2, 2)).build()
-    return striking(box, material or STEEL, 20.0, element=element)
+    return striking(box, material or STEEL, speed, element=element)
 
 
 @pytest.mark.parametrize("device", DEVICES)
