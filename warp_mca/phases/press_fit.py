@@ -10,7 +10,7 @@ from warp_mca.base.arrays import Array
 from warp_mca.kernels.contact.spring import ANY_DEPTH
 from warp_mca.physics.contact.bonds import nearest_of_side, normals
 from warp_mca.physics.elements.cells import body_materials
-from warp_mca.scene import ContactAll
+from warp_mca.scene import Contact, ContactAll, RigidPlane
 
 if TYPE_CHECKING:
     from warp_mca.phases.prepare import Prepared
@@ -34,9 +34,14 @@ def press_rate(depth: Array, energy: Array, ready: Prepared, stage: ContactStage
     """
     force = 2.0 * float(np.divide(energy, depth, out=np.zeros_like(depth), where=depth > 0.0).sum())
     weight = float(np.linalg.norm(ready.scene.gravity)) * float(ready.model.mass.sum())
-    if force <= WEIGHT * weight:
+    item = stage.items[scene]
+    contact, crossing = ready.scene.contacts[item.contact], 0.0
+    held = False  # nodes that cannot leave the plane do not swing
+    if isinstance(contact, Contact) and isinstance(contact.master, RigidPlane):
+        axis = int(np.abs(contact.master.normal).argmax())
+        held = bool((solver.model.fixed_axes[item.slave[depth > 0.0]] >> axis & 1).all())
+    if held or force <= WEIGHT * weight:
         return np.zeros_like(depth)
-    contact, crossing = ready.scene.contacts[stage.items[scene].contact], 0.0
     for body in ready.scene.bodies:
         if not body.rigid and (isinstance(contact, ContactAll) or body.name in contact.sides):
             mesh = ready.meshes[body.name]
