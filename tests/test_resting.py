@@ -70,6 +70,7 @@ def test_only_bodies_at_rest_under_their_weight_have_the_dashpot():
     assert law(replace(still, gravity=(0.0, 0.0, 0.0))) == plain
     assert law(replace(still, contacts=(replace(contact, law=mca.Penalty()),))) == plain
     assert law(replace(still, bodies=(replace(body, velocity=(0.0, -0.1, 0.0)),))) == plain
+    assert law(replace(still, bodies=(replace(body, position=(0.0, 1e-3, 0.0)),))) == plain  # falls
     along = tuple((0.1 * DOWN).tolist())
     assert law(replace(still, bodies=(replace(body, velocity=along),))) == damped  # slides, and does not approach
 

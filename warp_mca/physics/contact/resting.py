@@ -35,14 +35,18 @@ def resting(parts: Assembly, contact: Contact, slave: Faces, master: Faces | Non
     stiffness, bodies = own[0], [contact.slave.body]
     if isinstance(contact.master, RigidPlane):
         normal, speed = np.asarray(contact.master.normal, dtype=float), 0.0
+        apart = float(((parts.X[slave.nodes] - np.asarray(contact.master.point)) @ normal).min())
     else:
         assert master is not None
         stiffness = np.minimum(stiffness, other[0][1].max())
         bodies.append(contact.master.body)
-        normal = master.normal[nearest_faces(contact, slave, master)[1]]
+        own_face, face = nearest_faces(contact, slave, master)
+        normal = master.normal[face]
         speed = float((velocity[master.nodes] @ normal).mean())
-    approach = float(np.abs(velocity[slave.nodes] @ normal - speed).max() / np.linalg.norm(normal))
-    return replace(contact, law=usual_law(parts, bodies, approach, slave.nodes, stiffness))
+        apart = float((slave.middle[own_face] - master.middle[face]) @ normal)
+    size = float(np.linalg.norm(normal))
+    approach = float(np.abs(velocity[slave.nodes] @ normal - speed).max() / size)
+    return replace(contact, law=usual_law(parts, bodies, approach, apart / size, slave.nodes, stiffness))
 
 
 def at_rest(
@@ -57,12 +61,17 @@ def at_rest(
     if contact.law is not None or not any(parts.scene.gravity):
         return contact
     names = sorted({name for pair in pairs for name in pair})
-    least, most = (
-        {name: bound(velocity[parts.all_nodes(name)], axis=0) for name in names} for bound in (np.min, np.max)
-    )
-    apart = [np.maximum(most[a], most[b]) - np.minimum(least[a], least[b]) for a, b in pairs if a != b]
-    approach = min((float(np.linalg.norm(item)) for item in apart), default=math.inf)
-    return replace(contact, law=usual_law(parts, names, approach, nodes, stiffness))
+    both = np.hstack([velocity, parts.X])
+    least, most = ({name: bound(both[parts.all_nodes(name)], axis=0) for name in names} for bound in (np.min, np.max))
+    found = [(math.inf, math.inf)]
+    for a, b in pairs:
+        if a != b:
+            motion = np.maximum(most[a], most[b])[:3] - np.minimum(least[a], least[b])[:3]
+            between = np.maximum(least[a], least[b])[3:] - np.minimum(most[a], most[b])[3:]  # boxes around them
+            found.append((float(np.linalg.norm(motion)), float(between.max())))
+    g = float(np.linalg.norm(parts.scene.gravity))
+    approach, apart = min(found, key=lambda item: item[0] ** 2 + 2.0 * g * max(item[1], 0.0))
+    return replace(contact, law=usual_law(parts, names, approach, apart, nodes, stiffness))
 
 
 def undamped(model: Model, scene: Scene) -> Model:
@@ -72,15 +81,18 @@ def undamped(model: Model, scene: Scene) -> Model:
     return replace(model, passes=tuple(passes))
 
 
-def usual_law(parts: Assembly, bodies: Sequence[str], approach: float, nodes: Index, stiffness: Array) -> ContactLaw:
+def usual_law(
+    parts: Assembly, bodies: Sequence[str], approach: float, apart: float, nodes: Index, stiffness: Array
+) -> ContactLaw:
     """The law of a contact that leaves it to the program: with a dashpot where bodies rest on each other.
 
-    They rest where they approach no faster than their weight makes them bounce.
+    They rest where they meet, after a fall too, no faster than their weight makes them bounce.
 
     Args:
         parts: of the model.
         bodies: that the contact keeps apart; none is a plane.
         approach: speed at which they approach at the start [m/s].
+        apart: how far apart they are then [m].
         nodes: of the slave, shape (slave_count,).
         stiffness: of the springs of each [N/m], shape (slave_count,).
     """
@@ -89,7 +101,7 @@ def usual_law(parts: Assembly, bodies: Sequence[str], approach: float, nodes: In
     if not free.any():
         return Penalty()
     speed = g * min(_bounce(parts, name, float(stiffness.sum())) for name in bodies)
-    if approach > speed:
+    if approach**2 + 2.0 * g * max(apart, 0.0) > speed**2:
         return Penalty()
     return DampedPenalty(time=2.0 * CRITICAL * float(np.sqrt(mass[free] / stiffness[free]).min()), speed=speed)
 
