@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import GuardError, bad_value
 from warp_mca.phases.division import MAX_STEPS, coarser
 from warp_mca.phases.stretch import Stretch, stretch_ended
+from warp_mca.physics.contact.edge_stage import EdgeStage
 from warp_mca.scene import DampedPenalty, Settle
 
 if TYPE_CHECKING:
@@ -173,6 +174,27 @@ class HalfSteps:
         changed = masks[0] & ~self.waiting[0]
         lost = self._kinetic(before[0], after[0], changed)
         self.kept.damping += lost - self._kinetic(given[0], given[0] + 2.0 * half[0], changed)
+        self.kept.damping += self._unfelt(self.impact.steps.dt * (before[0] - given[0]))
+
+    def _unfelt(self, way: Array) -> float:
+        """Work of friction over the way that a change of velocity hides from springs along surfaces [J].
+
+        They add up velocities times steps, and nodes moved by those before the change. `way`: [m], (node_count, 3).
+        """
+        work = 0.0
+        for stage, own in zip(self.solver.contacts, self.state.contacts, strict=True):
+            tangential = np.array(own.spring.tangential.numpy(), dtype=np.float64)
+            if not len(tangential) or isinstance(stage, EdgeStage):
+                continue
+            face = np.array(own.spring.face.numpy(), dtype=np.int32)
+            pressed = np.flatnonzero(face >= 0)
+            moved = way[np.array(stage.slave.numpy(), dtype=np.int32)[pressed // stage.sides]]
+            if not stage.on_plane:
+                corners = np.array(stage.face.numpy(), dtype=np.int32)[face[pressed]]
+                weight = np.array(own.spring.weight.numpy(), dtype=np.float64)
+                moved = moved - np.einsum("sk,ski->si", weight[pressed], way[corners])
+            work -= float((tangential[pressed] * moved).sum())
+        return work
 
     def _kinetic(self, before: Array, after: Array, mask: NDArray[np.bool_]) -> float:
         """v(n-1/2) . M v(n+1/2) / 2 of some nodes [J], as records have it."""
