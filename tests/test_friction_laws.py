@@ -12,7 +12,8 @@ from test_recording import Memory
 import warp_mca as mca
 from warp_mca.geometry.cell_types import is_triangle
 from warp_mca.physics.contact.friction_laws import node_areas
-from warp_mca.physics.contact.surfaces import Faces, face_geometry, make_faces
+from warp_mca.physics.contact.sides import face_geometry
+from warp_mca.physics.contact.surfaces import Faces, make_faces
 from warp_mca.recorders.recorder import CONTACT
 from warp_mca.scene import model_file
 from warp_mca.scenes import sliding_block

@@ -8,8 +8,7 @@ from impacts import begun, finished, momentum, result_of
 from sharp_edges import HARD, SOFT, STEEL, H, bars, frame, in_frame, roof
 
 import warp_mca as mca
-from warp_mca.physics.contact.sides import MAX_SIDES, find_sides, stiffest_fold
-from warp_mca.physics.contact.surfaces import face_geometry
+from warp_mca.physics.contact.sides import MAX_SIDES, face_geometry, find_sides, stiffest_fold
 
 
 def sides(mesh: mca.Mesh, nodes: str = "boundary") -> tuple[np.ndarray, np.ndarray, np.ndarray]:

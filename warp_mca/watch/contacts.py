@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.physics.contact.surfaces import face_geometry, is_curved_contact
+from warp_mca.physics.contact.sides import face_geometry
+from warp_mca.physics.contact.surfaces import is_curved_contact
 from warp_mca.scene import RigidPlane
 from warp_mca.watch.row import Array, Finished, Values, listed_passes, row
 

@@ -27,7 +27,7 @@ PEAK_LOSS = 0.3
 # which may ring at 3.4 times that force.
 WAVE = (1.3, 4.0)
 STILL = 1e-6  # share of a relative velocity along the normal up to which bodies do not approach each other
-WEAK = 0.7  # the same below which springs that were given are softer than waves
+WEAK = 0.7  # force of a flat contact over that of one wave below which springs that were given are softer than waves
 
 
 @row(

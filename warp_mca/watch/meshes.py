@@ -10,7 +10,7 @@ import numpy as np
 
 from warp_mca.geometry import Box, Mesh, NestedPlate, Parts, Plate, Rod, Sphere
 from warp_mca.geometry.quality import doubled_nodes, pieces
-from warp_mca.physics.contact.surfaces import face_geometry
+from warp_mca.physics.contact.sides import face_geometry
 from warp_mca.scene import Prismatic, RigidPlane, Weld
 from warp_mca.watch.mass_report import body_report
 from warp_mca.watch.row import Context, Finished, Kind, Values, When, row

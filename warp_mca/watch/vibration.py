@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.kernels.records.columns import FRICTION, IMPULSE, NORMAL_IMPULSE, SPRING_ENERGY
-from warp_mca.physics.contact.surfaces import face_geometry, is_curved_contact
+from warp_mca.physics.contact.sides import face_geometry
+from warp_mca.physics.contact.surfaces import is_curved_contact
 from warp_mca.physics.elements.cells import body_materials
 from warp_mca.watch.row import Array, Context, Finished, Values, listed_passes, row, sides_of
 

@@ -17,7 +17,7 @@ from warp_mca.base.joining import offsets
 from warp_mca.geometry.face_projection import Projected, project
 from warp_mca.kernels.contact import bond
 from warp_mca.physics.contact.friction_laws import node_areas
-from warp_mca.physics.contact.sides import find_sides
+from warp_mca.physics.contact.sides import face_geometry, find_sides
 from warp_mca.scene import Contact, Surface
 
 if TYPE_CHECKING:
@@ -99,8 +99,8 @@ def places(contact: Contact, meshes: Mapping[str, Mesh], X: Mapping[str, Array])
 
 def normals(X: Array, face: Index) -> Array:
     """Unit normals of faces [-], shape (face_count, 3)."""
-    normal = np.cross(X[face[:, 2]] - X[face[:, 0]], X[face[:, 3]] - X[face[:, 1]])
-    return normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    area, normal = face_geometry(X, face)
+    return normal / area[:, None]
 
 
 def nearest_of_side(

@@ -13,6 +13,13 @@ BENT = math.cos(math.radians(0.1))  # between the normals of neighbouring faces 
 MAX_SIDES = 6  # of a surface; where rough faces need more, sides share numbers
 
 
+def face_geometry(X: Array, face: Index) -> tuple[Array, Array]:
+    """Areas [m^2], shape (face_count,), and area-weighted normals [m^2], shape (face_count, 3), of bilinear faces."""
+    a, b, c, d = (X[face[:, k]] for k in range(4))
+    normal = 0.5 * np.cross(c - a, d - b)
+    return np.linalg.norm(normal, axis=1), normal
+
+
 def neighbours(face: Index) -> tuple[Index, Index, Index]:
     """Pairs of faces that share an edge, two arrays of shape (pair_count,), and its nodes, shape (pair_count, 2)."""
     corner, following = face.ravel(), np.roll(face, -1, axis=1).ravel()

@@ -13,7 +13,7 @@ from warp_mca.geometry.cell_types import is_triangle
 from warp_mca.physics.contact.bonds import BondedNodes
 from warp_mca.physics.contact.friction_laws import friction_values
 from warp_mca.physics.contact.pairs import SLOTS, Pairs
-from warp_mca.physics.contact.sides import find_sides, is_curved, stiffest_fold
+from warp_mca.physics.contact.sides import face_geometry, find_sides, is_curved, stiffest_fold
 from warp_mca.physics.contact.stiffness import node_mean, spring_stiffness
 from warp_mca.scene import Contact, ContactAll, RigidPlane
 from warp_mca.scene.contact_laws import law_values
@@ -141,13 +141,6 @@ class ContactPass:
         """How many springs a slave node has: for each side of the master, of several bodies in a general contact."""
         sides = int(self.side.max(initial=0)) + 1
         return sides * SLOTS if self.pairs and sides > 1 else sides
-
-
-def face_geometry(X: Array, face: Index) -> tuple[Array, Array]:
-    """Areas [m^2], shape (face_count,), and area-weighted normals [m^2], shape (face_count, 3), of bilinear faces."""
-    a, b, c, d = (X[face[:, k]] for k in range(4))
-    normal = 0.5 * np.cross(c - a, d - b)
-    return np.linalg.norm(normal, axis=1), normal
 
 
 def make_faces(
