@@ -6,10 +6,9 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.materials.radial import isotropic_return
 
 wp.set_module_options({"enable_backward": False})
-
-_ITERATIONS = 6
 
 
 @cache
@@ -26,30 +25,23 @@ def parameters(precision: str) -> Any:
 
 
 @cache
-def return_map(precision: str) -> Any:
-    """The function (elastic, eps_p, p, G, c) -> (S, eps_p, p): q - 3 G dp is the flow stress at p + dp.
-
-    Newton's method comes from below, because the residual is convex, and slopes of hardening are small beside 3 G. It
-    has no branches, so that a CPU computes several elements at once.
-    """
-    t = scalars(precision)
-    R, mat33, vec4 = t.real, t.mat33, wp.types.vector(4, t.real)
+def strength(precision: str) -> Any:
+    """As `kernels.materials.radial` asks."""
+    R = scalars(precision).real
+    vec4 = wp.types.vector(4, R)
 
     @wp.func
-    def voce_return(elastic: mat33, eps_p: mat33, p: R, G: R, c: vec4):
-        trial = elastic - R(2.0) * G * eps_p
-        q = wp.sqrt(R(1.5) * wp.ddot(trial, trial))
-        dp = R(0.0)
-        for _ in range(wp.static(_ITERATIONS)):
-            left = c[1] * wp.exp(-c[2] * (p + dp))
-            beyond = q - R(3.0) * G * dp - (c[0] + (c[1] - left) + c[3] * (p + dp))
-            dp = wp.max(dp + beyond / (R(3.0) * G + c[2] * left + c[3]), R(0.0))
-        p_new = p + dp
-        dp = p_new - p  # what p takes of it: the next step corrects the rest, and rounding does not add up
-        eps_p = eps_p + wp.where(dp > R(0.0), R(1.5) * dp / q, R(0.0)) * trial
-        return elastic - R(2.0) * G * eps_p, eps_p, p_new
+    def voce_stress(p: R, dp: R, dt: R, c: vec4):
+        left = c[1] * wp.exp(-c[2] * p)
+        return c[0] + (c[1] - left) + c[3] * p, c[2] * left + c[3]
 
-    return voce_return
+    return voce_stress
+
+
+@cache
+def return_map(precision: str) -> Any:
+    """The radial return."""
+    return isotropic_return(precision, strength(precision), wp.types.vector(4, scalars(precision).real))
 
 
 @cache
