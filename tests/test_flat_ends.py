@@ -160,6 +160,14 @@ def test_a_block_at_rest_that_creeps_is_said_to(angle: float, creeps: bool):
         assert speed == pytest.approx(expected, rel=0.1)
 
 
+def test_a_block_that_slides_as_it_spins_is_not_said_to_creep():
+    """Its friction sums to less than mu F_n, since its nodes slide in unlike directions."""
+    flat = slope(0.0)
+    block = dataclasses.replace(flat.bodies[0], velocity=(1.0, 0.0, 0.0), angular_velocity=(0.0, 60.0, 0.0))
+    result = mca.run(dataclasses.replace(flat, bodies=(block,)))
+    assert not any("creep" in warning for warning in result.warnings)
+
+
 @pytest.mark.parametrize("name", ["sticking_block", "stick_slip"])
 def test_built_in_blocks_do_not_creep(name: str):
     result = finished(mca.make_scene(name))

@@ -295,13 +295,12 @@ def _(beyond: bool) -> list[str]:
 def _(beyond: bool) -> list[str]:
     """Rows of a contact that holds half of what it may and creeps at 1 mm/s; its body moved just so far, or further."""
     count, dt, interval, mu = 60, 1e-6, 1e-4, 0.4
-    names = vibration.IMPULSE, vibration.NORMAL_IMPULSE, vibration.FRICTION, vibration.SPRING_ENERGY
     springs = np.zeros((count // 2, 1, 64))
-    impulse, normal, friction, stored = names
-    springs[:, 0, impulse] = [0.5 * mu, 1.0, 0.0]
-    springs[:, 0, normal] = 1.0
-    springs[:, 0, friction] = 1e-3 * 0.5 * mu * dt * np.arange(count // 2)
-    springs[:, 0, stored] = 1e-12
+    springs[:, 0, vibration.IMPULSE] = [0.5 * mu, 1.0, 0.0]
+    springs[:, 0, vibration.NORMAL_IMPULSE] = 1.0
+    springs[:, 0, vibration.STICK_IMPULSE] = 0.5
+    springs[:, 0, vibration.FRICTION] = 1e-3 * 0.5 * mu * dt * np.arange(count // 2)
+    springs[:, 0, vibration.SPRING_ENERGY] = 1e-12
     plane = mca.RigidPlane()
     item = SimpleNamespace(contact=0, mu=mu, sign=1.0, leads=True, plane=plane, slave=np.arange(3))
     model = SimpleNamespace(passes=[item], contact_axes=np.array([[[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]]))

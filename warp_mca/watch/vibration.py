@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.kernels.records.columns import FRICTION, IMPULSE, NORMAL_IMPULSE, SPRING_ENERGY
+from warp_mca.kernels.records.columns import FRICTION, IMPULSE, NORMAL_IMPULSE, SPRING_ENERGY, STICK_IMPULSE
 from warp_mca.physics.contact.sides import face_geometry
 from warp_mca.physics.contact.surfaces import is_curved_contact
 from warp_mca.physics.elements.cells import body_materials
@@ -25,7 +25,8 @@ PARTS = 4  # of the second half of a run, in which a body at rest presses alike
 CREEPING = 3  # of them, at least: a body that slides until it rests does not
 ROWS = 5  # of a part, at least
 STEADY = 0.3  # by which normal forces of the parts differ from their mean, at most
-WITHIN = 0.95  # of mu F_n: friction below it in the mean does not slide
+WITHIN = 0.99  # of mu F_n: friction of a body that slides alike is beyond it
+HELD_SHARE = 0.02  # of F_n, at least, on nodes that stick: a body that slides or spins on its face has none
 ONE_WAY = 0.8  # of the friction of rows that their vector sum keeps, at least
 ELASTIC = 0.1  # of the energy of the springs: less friction work in a part is no creep
 LINEAR = 0.01  # strain v / c up to which bodies count as linear; beyond, twice of what is more may stiffen them
@@ -91,8 +92,8 @@ def ringing(c: Finished, times: float) -> Iterator[Values]:
 
 @row(
     "{name} creeps at {speed:.2g} m/s, though friction there is {share:.0%} of what holds it: nodes whose springs open "
-    "for a few steps lose their grip and slide when they close; a body that should rest moves so far, and friction "
-    "takes that work;",
+    "for a few steps lose their grip and slide when they close; a body that should rest moves so far, one that should "
+    "slide moves too far, and friction takes that work;",
     "leave the contact's law out, so that it has a dashpot at rest, or settle the bodies first: phases=(mca.Settle(),)",
     30.0,
     "times the creep at most; a body that moved further slid, or rolls with a creep of less than a hundredth",
@@ -229,10 +230,16 @@ def _creep(springs: Array, sign: Array, normal: Array, mu: float, dt: float) -> 
     pressed = _sums(springs[:, :, NORMAL_IMPULSE].sum(axis=1), ends)
     force = np.einsum("p,rpc->rc", sign, springs[:, :, IMPULSE])
     along = force - np.outer(force @ normal, normal)
+    stuck = _sums(springs[:, :, STICK_IMPULSE].sum(axis=1), ends)
     size, total = _sums(np.linalg.norm(along, axis=1), ends), np.linalg.norm(_sums(along, ends), axis=1)
     work = np.diff(springs[ends, :, FRICTION].sum(axis=1))
     held = float(springs[:, :, SPRING_ENERGY].sum(axis=1).mean())
-    creeps = (size < WITHIN * mu * pressed) & (total > ONE_WAY * size) & (work > ELASTIC * held)
+    creeps = (
+        (size < WITHIN * mu * pressed)
+        & (stuck > HELD_SHARE * pressed)
+        & (total > ONE_WAY * size)
+        & (work > ELASTIC * held)
+    )
     mean = pressed / np.diff(ends)
     if creeps.sum() < CREEPING or mean.min() <= 0.0 or np.abs(mean / mean.mean() - 1.0).max() > STEADY:
         return 0.0, 0.0
