@@ -1,4 +1,4 @@
-"""What logarithmic strain is made of: the logarithm without a call, and principal directions without a branch."""
+"""What strain and laws are made of: logarithm, exponential, power without a call, directions without a branch."""
 
 import numpy as np
 import pytest
@@ -6,6 +6,7 @@ import warp as wp
 
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.simd import vectorised
+from warp_mca.kernels.materials.exponential import exp_function, power_function
 from warp_mca.kernels.materials.kinematics import eigen_function
 from warp_mca.kernels.materials.logarithm import log_function
 
@@ -33,6 +34,32 @@ def test_logarithm_to_three_units_in_the_last_place(precision):
     found, exact = found[len(none) :], np.log(y.astype(np.longdouble))
     assert (found[y == 1.0] == 0.0).all()
     assert (np.abs(found - exact) < 3.0 * np.spacing(np.abs(exact).astype(kind)))[y != 1.0].all()
+
+
+@pytest.mark.parametrize("precision", PRECISIONS)
+def test_exponential_and_power_to_two_units_in_the_last_place(precision):
+    R, kind = scalars(precision).real, np.float32 if precision == "mixed" else np.float64
+    natural_exp, power = exp_function(precision), power_function(precision)
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def take_both(y: wp.array(dtype=R), exp_out: wp.array(dtype=R), root_out: wp.array(dtype=R)):
+        i = wp.tid()
+        exp_out[i] = natural_exp(y[i])
+        root_out[i] = power(y[i], R(0.25))
+
+    end = 87.0 if precision == "mixed" else 708.0
+    y = np.concatenate([[np.nan, 0.0, 1e9, -1e9], np.linspace(-end, end, 4001), np.linspace(-1.0, 1.0, 2001)])
+    y = y.astype(kind)
+    out = [wp.full(len(y), -1.0, dtype=R, device="cpu") for _ in range(2)]
+    wp.launch(vectorised(take_both), len(y), inputs=[wp.array(y, dtype=R, device="cpu")], outputs=out, device="cpu")
+    found, roots = (o.numpy() for o in out)
+    exact = np.exp(y[4:].astype(np.longdouble))
+    assert np.isnan(found[0]) and found[1] == 1.0 and found[2] > 1e38 and 0.0 <= found[3] < 1e-37
+    assert (np.abs(found[4:] - exact) < 2.0 * np.spacing(exact.astype(kind))).all()
+    assert np.isnan(roots[0]) and roots[1] == 0.0
+    whole = y[4:] > 0.0
+    exact = y[4:][whole].astype(np.longdouble) ** 0.25
+    assert np.abs(roots[4:][whole] / exact - 1.0).max() < 10.0 * np.finfo(kind).eps
 
 
 def decomposed(C: np.ndarray, precision: str) -> tuple[np.ndarray, np.ndarray]:

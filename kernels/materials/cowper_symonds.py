@@ -11,6 +11,7 @@ import warp as wp
 
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.materials import radial, table
+from warp_mca.kernels.materials.exponential import power_function
 
 wp.set_module_options({"enable_backward": False})
 
@@ -21,24 +22,24 @@ parameters = table.parameters
 
 
 @cache
-def strength(precision: str) -> Any:
+def rate_factor(precision: str) -> Any:
     """As `kernels.materials.radial` asks."""
-    R, Table, curve = scalars(precision).real, table.table_type(precision), table.curve_function(precision, COUNT)
+    R, Table, power = scalars(precision).real, table.table_type(precision), power_function(precision)
 
     @wp.func
-    def rated_stress(p: R, dp: R, dt: R, c: Table):
-        static, slope, _work = curve(p, c)
+    def cowper_symonds_rate(dp: R, dt: R, c: Table):
         root = c.law[c.row, wp.static(ROOT)]
-        over = wp.pow(dp / (dt * c.law[c.row, wp.static(D)]), root)
-        return static * (R(1.0) + over), slope * (R(1.0) + over) + static * root * over / dp
+        over = power(dp / (dt * c.law[c.row, wp.static(D)]), root)
+        return R(1.0) + over, root * over / dp
 
-    return rated_stress
+    return cowper_symonds_rate
 
 
 @cache
 def flow(precision: str) -> Any:
     """The radial return."""
-    return radial.rated_return(precision, strength(precision), table.table_type(precision))
+    kind, hardening = table.table_type(precision), table.hardening(precision, COUNT)
+    return radial.rated_return(precision, kind, hardening, rate_factor(precision))
 
 
 @cache

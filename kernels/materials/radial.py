@@ -1,7 +1,8 @@
-"""Owns the radial return of isotropic laws: q - 3 G dp = sigma(p + dp, dp / dt), by Newton's method in a bracket.
+"""Owns the radial return of isotropic laws: q - 3 G dp = h(p + dp) r(dp / dt), by Newton's method.
 
-A law gives its flow stress as a function (p, dp, dt, c) -> (sigma, slope over dp) [Pa], with the equivalent plastic
-strain p after the growth dp in the time dt [s].
+A law gives its hardening h as a function (p, c) -> (flow stress at rest, slope over p) [Pa] of the equivalent plastic
+strain p, and the factor r of its rate as a function (dp, dt, c) -> (factor [-], slope over dp [-]) of the growth dp > 0
+in the time dt [s]; it is 1 at rest and does not fall.
 """
 
 from functools import cache
@@ -13,7 +14,7 @@ from warp_mca.kernels.hardware.scalars import scalars
 
 wp.set_module_options({"enable_backward": False})
 
-ITERATIONS = 7  # two or three are usual where the rate is that of the step before
+ITERATIONS = 3  # of hardening alone; with rates 4 to 7, where the first two find hardening and its slope anew
 
 # Plastic strain, its equivalent p, what p lacks [-], plastic work [J/m^3]; of the last step that flowed the flow stress
 # [Pa] and the growth of p [-].
@@ -22,45 +23,48 @@ SIZE, WORK = 10, 7  # rows of the history; row of the plastic work
 
 
 @cache
-def increment_function(precision: str, strength: Any, kind: Any) -> Any:
+def increment_function(precision: str, kind: Any, hardening: Any, rate: Any = None, iterations: int = 0) -> Any:
     """The function (q, G, p, dt, guess, c) -> dp, with parameters c of this `kind`; 0 where q is below yield.
 
-    The flow stress does not fall as dp grows, so that the root lies between 0 and (q - sigma(p, 0)) / (3 G). Newton's
-    method starts from the guess, or from above where that is 0. Where the flow stress is concave it is below the root
-    after a step, and then comes from below. A step out of the bracket goes to a sixteenth of it. There are no branches,
-    so that a CPU computes several elements at once.
+    The root lies below (q - h(p)) / (3 G). Newton's method starts from the guess, or from half of that where it is 0.
+    It goes up as usual, and down in ln dp, in which the logarithm of a rate is linear: dp stays above 0. There are no
+    branches, so that a CPU computes several elements at once.
     """
-    R = scalars(precision).real
+    R, anew = scalars(precision).real, ITERATIONS if rate is None else 2
 
     @wp.func
     def increment(q: R, G: R, p: R, dt: R, guess: R, c: kind):
         stiffness = R(3.0) * G
-        sigma, slope = strength(p, R(0.0), dt, c)
-        high = (q - sigma) / stiffness
-        flows = high > R(0.0)
-        high = wp.where(flows, high, R(1e-6))  # any, where the result is not taken
-        low = R(0.0)
-        x = wp.where(guess > R(0.0), wp.min(high, guess), high)
-        for _ in range(wp.static(ITERATIONS)):
-            sigma, slope = strength(p + x, x, dt, c)
-            residual = stiffness * x + sigma - q
-            above = residual > R(0.0)
-            high = wp.where(above, x, high)
-            low = wp.where(above, low, x)
-            step = x - residual / (stiffness + slope)
-            inside = step >= low and step <= high
-            x = wp.where(inside, step, low + R(0.0625) * (high - low))
+        hard, slope = hardening(p, c)
+        most = (q - hard) / stiffness
+        flows = most > R(0.0)
+        most = wp.where(flows, most, R(1e-6))  # any, where the result is not taken
+        x = wp.where(guess > R(0.0), wp.min(guess, most), R(0.5) * most)
+        at = x
+        for k in range(wp.static(iterations or ITERATIONS)):
+            if wp.static(k < anew):
+                hard, slope = hardening(p + x, c)
+                at = x
+            sigma = hard + slope * (x - at)
+            tangent = slope
+            if wp.static(rate is not None):
+                factor, growth = rate(x, dt, c)
+                tangent = slope * factor + sigma * growth
+                sigma = sigma * factor
+            over = (stiffness * x + sigma - q) / ((stiffness + tangent) * x)
+            down = R(1.0) / (R(1.0) + over + R(0.5) * over * over)  # e^-over to second order
+            x = wp.min(most, wp.where(over > R(0.0), x * down, x - over * x))
         return wp.where(flows, x, R(0.0))
 
     return increment
 
 
 @cache
-def isotropic_return(precision: str, strength: Any, kind: Any) -> Any:
+def isotropic_return(precision: str, kind: Any, hardening: Any) -> Any:
     """The `return_map` of a law of flow without rates, see `kernels.materials.laws`."""
     t = scalars(precision)
     R, mat33 = t.real, t.mat33
-    increment = increment_function(precision, strength, kind)
+    increment = increment_function(precision, kind, hardening)
 
     @wp.func
     def radial_return(elastic: mat33, eps_p: mat33, p: R, G: R, c: kind):
@@ -75,7 +79,7 @@ def isotropic_return(precision: str, strength: Any, kind: Any) -> Any:
 
 
 @cache
-def rated_return(precision: str, strength: Any, kind: Any, heated: Any = None) -> Any:
+def rated_return(precision: str, kind: Any, hardening: Any, rate: Any, iterations: int = 7, heated: Any = None) -> Any:
     """The `flow` of a law with rates or heat, whose history is `HISTORY`, see `kernels.materials.laws`.
 
     `heated` is the function (c, work) -> c that changes the parameters with the plastic work before the step.
@@ -85,7 +89,7 @@ def rated_return(precision: str, strength: Any, kind: Any, heated: Any = None) -
     """
     t = scalars(precision)
     R, mat33, rows = t.real, t.mat33, wp.types.vector(SIZE, t.real)
-    increment = increment_function(precision, strength, kind)
+    increment = increment_function(precision, kind, hardening, rate, iterations)
 
     @wp.func
     def rated_flow(elastic: mat33, h: rows, dt: R, G: R, c: kind):

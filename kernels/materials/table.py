@@ -77,22 +77,22 @@ def curve_function(precision: str, column: int) -> Any:
 
 
 @cache
-def strength(precision: str) -> Any:
-    """As `kernels.materials.radial` asks."""
-    R, Table, curve = scalars(precision).real, table_type(precision), curve_function(precision, COUNT)
+def hardening(precision: str, column: int = COUNT) -> Any:
+    """As `kernels.materials.radial` asks, of the table from this column on."""
+    R, Table, curve = scalars(precision).real, table_type(precision), curve_function(precision, column)
 
     @wp.func
-    def table_stress(p: R, dp: R, dt: R, c: Table):
+    def table_hardening(p: R, c: Table):
         stress, slope, _work = curve(p, c)
         return stress, slope
 
-    return table_stress
+    return table_hardening
 
 
 @cache
 def return_map(precision: str) -> Any:
     """The radial return."""
-    return isotropic_return(precision, strength(precision), table_type(precision))
+    return isotropic_return(precision, table_type(precision), hardening(precision))
 
 
 @cache

@@ -6,6 +6,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.materials.exponential import exp_function
 from warp_mca.kernels.materials.radial import isotropic_return
 
 wp.set_module_options({"enable_backward": False})
@@ -25,34 +26,34 @@ def parameters(precision: str) -> Any:
 
 
 @cache
-def strength(precision: str) -> Any:
+def hardening(precision: str) -> Any:
     """As `kernels.materials.radial` asks."""
     R = scalars(precision).real
-    vec4 = wp.types.vector(4, R)
+    vec4, exp = wp.types.vector(4, R), exp_function(precision)
 
     @wp.func
-    def voce_stress(p: R, dp: R, dt: R, c: vec4):
-        left = c[1] * wp.exp(-c[2] * p)
+    def voce_hardening(p: R, c: vec4):
+        left = c[1] * exp(-c[2] * p)
         return c[0] + (c[1] - left) + c[3] * p, c[2] * left + c[3]
 
-    return voce_stress
+    return voce_hardening
 
 
 @cache
 def return_map(precision: str) -> Any:
     """The radial return."""
-    return isotropic_return(precision, strength(precision), wp.types.vector(4, scalars(precision).real))
+    return isotropic_return(precision, wp.types.vector(4, scalars(precision).real), hardening(precision))
 
 
 @cache
 def plastic_energy(precision: str) -> Any:
     """The function (eps_p, p, c) -> plastic work per volume [J/m^3], the integral of the flow stress over p."""
     t = scalars(precision)
-    R, mat33, vec4 = t.real, t.mat33, wp.types.vector(4, t.real)
+    R, mat33, vec4, exp = t.real, t.mat33, wp.types.vector(4, t.real), exp_function(precision)
 
     @wp.func
     def voce_energy(eps_p: mat33, p: R, c: vec4):
-        saturated = (R(1.0) - wp.exp(-c[2] * p)) / c[2]
+        saturated = (R(1.0) - exp(-c[2] * p)) / c[2]
         return c[0] * p + c[1] * (p - saturated) + R(0.5) * c[3] * p * p
 
     return voce_energy
