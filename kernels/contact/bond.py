@@ -87,7 +87,7 @@ def hold_bond(
             spring.face[e] = -1
     else:
         spring.bond_time[e] = spring.bond_time[e] + dt
-    spring.made[e] = spring.made[e] + energy_made(e, force, stored, spent, du, spring)
+    spring.made[e] = spring.made[e] + energy_made(spring.force[e], spring.energy[e], force, stored, spent, du)
     add_normal_force(scene, pressed, per_newton, normal_force_out)
     spring.stiffness[e] = k
     spring.rest[e] = zero

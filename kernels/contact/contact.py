@@ -171,7 +171,7 @@ def plane_kernel(friction: bool, each: bool, may_overlap: bool = False, laws: La
     """Kernel: contact of slave nodes with an analytic plane that may move along itself; as for surfaces."""
     press = spring_function(friction, laws)
     open_contact = open_function(friction, laws)
-    gap_from_rest = rest_function(may_overlap, laws.pressed)
+    gap_from_rest = rest_function(laws.pressed)
     of, Real, Vector, Index = value_function(each), kind(wp.float64, each), kind(wp.vec3d, each), kind(wp.int32, each)
 
     @wp.kernel(enable_backward=False, module="unique")
@@ -202,7 +202,10 @@ def plane_kernel(friction: bool, each: bool, may_overlap: bool = False, laws: La
         k = of(scene, s)
         normal = of(plane_normal, k)
         velocity = of(plane_velocity, k)
-        gap = gap_from_rest(s, wp.dot(X[i] - of(plane_point, k) + u[i], normal), spring)
+        gap = wp.dot(X[i] - of(plane_point, k) + u[i], normal)
+        if wp.static(may_overlap):
+            gap, rest = gap_from_rest(s, gap, spring.rest[s], spring)
+            spring.rest[s] = rest
         before = spring.tangential[s]
         du = dt * (v[i] - velocity)
         if gap < -of(deepest, k):

@@ -39,7 +39,7 @@ def motion_of_old(s: int, v: wp.array(dtype=wp.vec3d), slave: SkinEdges, master:
 def press_kernel(friction: bool, each: bool, laws: Laws) -> Any:
     """Kernel: force of each spring, from spring `first` on: those that `meet_kernel` found edges for, others open."""
     press, open_contact = spring_function(friction, laws), open_function(friction, laws)
-    gap_from_rest = rest_function(True, laws.pressed)
+    gap_from_rest = rest_function(laws.pressed)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)
@@ -82,9 +82,9 @@ def press_kernel(friction: bool, each: bool, laws: Laws) -> Any:
                     b = int(-1)
         if b >= 0:
             gap = met.gap[s]
-            if met.before[s] != s:
-                spring.rest[s] = met.rest[s]
-            pressed = gap_from_rest(s, gap, spring)
+            rest = wp.where(met.before[s] == s, spring.rest[s], met.rest[s])
+            pressed, rest = gap_from_rest(s, gap, rest, spring)
+            spring.rest[s] = rest
             stiffness = wp.min(k_old, factor * master.stiffness[b])
             _, F_n = press(s, pressed, met.normal[s], met.du[s], k_old, stiffness, of(mu, k), dt, spring)
             add_normal_force(k, F_n, of(per_newton, k), normal_force_out)

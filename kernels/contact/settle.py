@@ -96,7 +96,7 @@ def settle_functions(friction: bool, laws: Laws) -> tuple[Any, Any]:
     """The functions (settle: press a node on the face that it touches; let_go: release a node that found no face)."""
     press = spring_function(friction, laws)
     open_contact = open_function(friction, laws)
-    gap_from_rest = rest_function(True, laws.pressed)
+    gap_from_rest = rest_function(laws.pressed)
 
     @wp.func
     def settle(
@@ -114,12 +114,15 @@ def settle_functions(friction: bool, laws: Laws) -> tuple[Any, Any]:
         # a spring with neither gap nor normal has no force, and is released as an open one
         gap_kept = wp.where(touch.touches, near.gap, wp.float64(0.0))
         normal_kept = wp.where(touch.touches, near.normal, wp.vec3d())
-        if touch.touches and spring.face[s] < 0 and touch.begins < wp.float64(FAR):
-            spring.rest[s] = wp.max(-near.gap - touch.begins, wp.float64(0.0))
-        gap_pressed = gap_from_rest(s, gap_kept, spring)
-        k_old = wp.where(spring.face[s] < 0, wp.min(touch.own, touch.limit), spring.stiffness[s])
+        is_open = spring.face[s] < 0
+        rest = spring.rest[s]
+        if touch.touches and is_open and touch.begins < wp.float64(FAR):
+            rest = wp.max(-near.gap - touch.begins, wp.float64(0.0))
+        gap_pressed, rest = gap_from_rest(s, gap_kept, rest, spring)
+        k_old = wp.where(is_open, wp.min(touch.own, touch.limit), spring.stiffness[s])
         stiffness = wp.where(touch.touches, wp.min(k_old, touch.limit), k_old)
         force, F_n = press(s, gap_pressed, normal_kept, touch.du, k_old, stiffness, mu, touch.dt, spring)
+        spring.rest[s] = rest
         spring.stiffness[s] = stiffness
         add_normal_force(scene, F_n, per_newton, normal_force_out)
         spring.face[s] = wp.where(touch.touches, near.face, -1)
@@ -147,7 +150,8 @@ def settle_functions(friction: bool, laws: Laws) -> tuple[Any, Any]:
         if spring.face[s] >= 0:
             du = dt * (v[i] - master_velocity(v, face, spring.face[s], spring.weight[s]))
             open_contact(s, du, spring.stiffness[s], spring)
-            gap_from_rest(s, wp.float64(0.0), spring)
+            _gap, rest = gap_from_rest(s, wp.float64(0.0), spring.rest[s], spring)
+            spring.rest[s] = rest
         if held == wp.float64(ANY_DEPTH) or (held > wp.float64(0.0) and front < wp.float64(FAR)):
             spring.held[s] = wp.float64(0.0)
 

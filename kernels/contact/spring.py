@@ -88,13 +88,12 @@ def pressure_function(friction: bool) -> Any:
 
 
 @wp.func
-def shrink(s: int, spring: Spring) -> wp.float64:
-    """By how much the overlap of bodies that are pressed apart shrinks in this step [m].
+def shrink(s: int, rest: wp.float64, spring: Spring) -> wp.float64:
+    """By how much the overlap `rest` of bodies that are pressed apart shrinks in this step [m].
 
     In steps of a, 2 a, ..., h a, h a, ..., 2 a, a, so smoothly that few springs open; j (j + 1) / 2 a are left for the
     last j.
     """
-    rest = spring.rest[s]
     a = spring.pressed[s][0]
     one = wp.float64(1.0)
     left = wp.float64(0.5) * (wp.sqrt(one + wp.float64(8.0) * rest / a) - one)
@@ -104,26 +103,23 @@ def shrink(s: int, spring: Spring) -> wp.float64:
 
 
 @cache
-def rest_function(may_overlap: bool, pressed: bool) -> Any:
-    """The function that measures a gap from the depth at which a spring is free: 0, or the overlap at the start.
+def rest_function(pressed: bool) -> Any:
+    """The function (s, gap, rest, spring) -> (gap from the depth `rest` at which a spring is free, new rest) [m].
 
     That overlap shrinks as the node moves outwards, and does not grow again. Where bodies are pressed apart it shrinks
-    by itself, too.
+    by itself, too. `Spring.rest` is left to the caller, who writes it once all is read.
     """
 
     @wp.func
-    def gap_from_rest(s: int, gap: wp.float64, spring: Spring):
-        if wp.static(may_overlap):
-            rest = wp.min(spring.rest[s], wp.max(-gap, wp.float64(0.0)))
-            if wp.static(pressed):
-                if spring.pressed[s][0] > wp.float64(0.0):
-                    rest = spring.rest[s] - shrink(s, spring)
-                    gap = wp.min(gap, -rest)  # a node that moves out faster has no force, and the overlap shrinks on
-                else:
-                    spring.pressed[s] = wp.vec2d()
-            spring.rest[s] = rest
-            gap += rest
-        return gap
+    def gap_from_rest(s: int, gap: wp.float64, rest: wp.float64, spring: Spring):
+        left = wp.min(rest, wp.max(-gap, wp.float64(0.0)))
+        if wp.static(pressed):
+            if spring.pressed[s][0] > wp.float64(0.0):
+                left = rest - shrink(s, rest, spring)
+                gap = wp.min(gap, -left)  # a node that moves out faster has no force, and the overlap shrinks on
+            else:
+                spring.pressed[s] = wp.vec2d()
+        return gap + left, left
 
     return gap_from_rest
 
@@ -138,7 +134,6 @@ def spring_function(friction: bool, laws: Laws) -> Any:
     law_force, law_energy = functions.force, functions.energy
     damped = functions.dashpot is not None
     damp = dashpot_function(laws.normal) if damped else None
-    pressure = pressure_function(friction)
     friction_limit = limit_function(laws.friction) if by_laws else None
 
     @wp.func
@@ -177,12 +172,21 @@ def spring_function(friction: bool, laws: Laws) -> Any:
         normal_impulse = spring.normal_impulse[s]
         depth = spring.depth[s]
         made_before = spring.made[s]
+        force_old = spring.force[s]
+        energy_old = spring.energy[s]
+        tangential = wp.vec3d()
+        friction_work = wp.float64(0.0)
+        stick_impulse = wp.float64(0.0)
+        if wp.static(friction):
+            tangential = spring.tangential[s]
+            friction_work = spring.friction[s]
+            stick_impulse = spring.stick_impulse[s]
         half = wp.float64(0.5)
         Fn = law_force(-gap, k, spring.parameters, s)
         stored = law_energy(-gap, k, spring.parameters, s)
         spent = wp.float64(0.0)
         if wp.static(damped):
-            Fn, spent = damp(s, Fn, -gap, normal, du, k, pressure(s, spring), dt, spring)
+            Fn, spent = damp(s, Fn, -gap, normal, du, k, force_old - tangential, dt, spring)
         share = wp.float64(1.0)
         if k < k_old:
             share, lost = soften(s, gap, normal, du, k_old, k, spring)
@@ -190,22 +194,20 @@ def spring_function(friction: bool, laws: Laws) -> Any:
         force = Fn * normal
         energy = stored
         if wp.static(friction):
-            friction_work = spring.friction[s]
-            stick_impulse = spring.stick_impulse[s]
             limit = mu * Fn
             if wp.static(by_laws):
                 limit = friction_limit(mu, Fn, normal, du, dt, spring.friction_parameters, s)
                 spring.limit[s] = limit
-            Ft, work, stick = stick_slip(share * spring.tangential[s], du, normal, limit, k)
+            Ft, work, stick = stick_slip(share * tangential, du, normal, limit, k)
             force += Ft
             energy += half * wp.dot(Ft, Ft) / k
             spent += work
             spring.friction[s] = friction_work + work
             if stick == 1 and mu > wp.float64(0.0):  # a scene of a batch may have no friction
                 spring.stick_impulse[s] = stick_impulse + Fn
-        made = energy_made(s, force, energy, spent, du, spring)
+        made = energy_made(force_old, energy_old, force, energy, spent, du)
         if wp.static(laws.pressed):  # work that brings the overlap in, of the forces at both ends of the step
-            given = half * (wp.length(pressure(s, spring)) + Fn) * spring.pressed[s][1]
+            given = half * (wp.length(force_old - tangential) + Fn) * spring.pressed[s][1]
             made -= given
             spring.drive[s] = spring.drive[s] + given
         if wp.static(friction):
@@ -239,7 +241,7 @@ def open_function(friction: bool, laws: Laws = PLAIN) -> Any:
             spring.friction[s] = spring.friction[s] + released
             spent += released
             spring.tangential[s] = wp.vec3d()
-        made = energy_made(s, wp.vec3d(), zero, spent, du, spring)
+        made = energy_made(spring.force[s], spring.energy[s], wp.vec3d(), zero, spent, du)
         spring.made[s] = spring.made[s] + made
         spring.energy[s] = zero
         spring.force[s] = wp.vec3d()
