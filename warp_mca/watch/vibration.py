@@ -231,7 +231,8 @@ def _creep(springs: Array, sign: Array, normal: Array, mu: float, dt: float) -> 
     force = np.einsum("p,rpc->rc", sign, springs[:, :, IMPULSE])
     along = force - np.outer(force @ normal, normal)
     stuck = _sums(springs[:, :, STICK_IMPULSE].sum(axis=1), ends)
-    size, total = _sums(np.linalg.norm(along, axis=1), ends), np.linalg.norm(_sums(along, ends), axis=1)
+    size, sums = _sums(np.linalg.norm(along, axis=1), ends), _sums(along, ends)
+    total = np.linalg.norm(sums, axis=1)
     work = np.diff(springs[ends, :, FRICTION].sum(axis=1))
     held = float(springs[:, :, SPRING_ENERGY].sum(axis=1).mean())
     creeps = (
@@ -240,6 +241,8 @@ def _creep(springs: Array, sign: Array, normal: Array, mu: float, dt: float) -> 
         & (total > ONE_WAY * size)
         & (work > ELASTIC * held)
     )
+    if np.linalg.norm(sums.sum(axis=0)) < ONE_WAY * total.sum():  # to and fro
+        return 0.0, 0.0
     mean = pressed / np.diff(ends)
     if creeps.sum() < CREEPING or mean.min() <= 0.0 or np.abs(mean / mean.mean() - 1.0).max() > STEADY:
         return 0.0, 0.0
