@@ -83,7 +83,7 @@ def _limits(scene: Scene, model: Model, interval: float, intervals: int) -> tupl
         )
     with np.errstate(over="ignore"):
         speed = max(float(np.linalg.norm(model.V, axis=1).max()), float(np.abs(model.V).max()))  # squares may be 0
-    driven = max((float(np.abs(drive.velocities).max()) for drive in scene.prescribed), default=0.0)
+    driven = max((float(np.abs(drive.velocity_table[1]).max()) for drive in scene.prescribed), default=0.0)
     driven = max([driven, *(float(np.abs(base.velocities).sum(axis=1).max()) for base in model.bases)])
     fastest = max(speed, driven) + float(np.linalg.norm(scene.gravity)) * interval * intervals
     far = float(np.abs(model.X).max())

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 
+MOST = 1e9  # that a factor may be [-]
 PIECES = 100  # straight ones of a curve: the integral of a half sine is 8e-5 less than that of the curve
 
 
@@ -26,6 +27,8 @@ class Amplitude:
     def __post_init__(self) -> None:
         validate.plain(self)
         validate.table("Amplitude", self.times, values=self.values)
+        for value in self.values:
+            validate.within("Amplitude", -MOST, MOST, values=value)
 
     @classmethod
     def half_sine(cls, duration: float, start: float = 0.0) -> Amplitude:

@@ -13,6 +13,7 @@ from warp_mca.base.errors import bad_value
 from warp_mca.scene.amplitude import CONSTANT, Amplitude
 
 Vec3 = tuple[float, float, float]
+MOST = 1e15  # Pa, N, m/s^2 that a load may have
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,6 +110,12 @@ class TimedLoad(Load):
         return self.amplitude or CONSTANT
 
 
+def _check_vector(owner: str, **values: Vec3) -> None:
+    """Refuse what is no vector, or beyond MOST."""
+    validate.vectors(owner, **values)
+    validate.entries(owner, 3, lambda own, **entry: validate.within(own, -MOST, MOST, **entry), **values)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Pressure(TimedLoad):
     """Pressure on a surface: it stays normal to the faces as they move, and acts on the area that they have then.
@@ -120,12 +127,12 @@ class Pressure(TimedLoad):
 
     nodes: str
     pressure: float
-    module: ClassVar[str] = "warp_mca.physics.loads.faces"
+    module = "warp_mca.physics.loads.faces"
 
     def __post_init__(self) -> None:
         super().__post_init__()
         validate.texts(self.title, nodes=self.nodes)
-        validate.finite(self.title, pressure=self.pressure)
+        validate.within(self.title, -MOST, MOST, pressure=self.pressure)
 
     def sets(self) -> dict[str, tuple[str, str, bool]]:
         """Its surface."""
@@ -146,12 +153,12 @@ class Traction(TimedLoad):
     nodes: str
     traction: Vec3
     follows: bool = False
-    module: ClassVar[str] = "warp_mca.physics.loads.faces"
+    module = "warp_mca.physics.loads.faces"
 
     def __post_init__(self) -> None:
         super().__post_init__()
         validate.texts(self.title, nodes=self.nodes)
-        validate.vectors(self.title, traction=self.traction)
+        _check_vector(self.title, traction=self.traction)
         validate.flags(self.title, follows=self.follows)
 
     def sets(self) -> dict[str, tuple[str, str, bool]]:
@@ -174,11 +181,11 @@ class Force(TimedLoad):
     nodes: str | None = None
     at: Vec3 | None = None
     spread: str = "equal"
-    module: ClassVar[str] = "warp_mca.physics.loads.dead"
+    module = "warp_mca.physics.loads.dead"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        validate.vectors(self.title, force=self.force)
+        _check_vector(self.title, force=self.force)
         validate.choice(self.title, ("equal", "area"), spread=self.spread)
         if (self.nodes is None) == (self.at is None):
             raise bad_value(f"{self.title}.nodes", self.nodes, "give either nodes or at")
@@ -203,11 +210,11 @@ class BodyForce(TimedLoad):
     """
 
     acceleration: Vec3
-    module: ClassVar[str] = "warp_mca.physics.loads.dead"
+    module = "warp_mca.physics.loads.dead"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        validate.vectors(self.title, acceleration=self.acceleration)
+        _check_vector(self.title, acceleration=self.acceleration)
 
 
 LOADS: dict[str, type[Load]] = {kind.__name__: kind for kind in (Pressure, Traction, Force, BodyForce)}
