@@ -66,6 +66,7 @@ SOUND: dict[type, Any] = {
     mca.Traction: mca.Traction(body="low", nodes="ymin", traction=(1e5, 0.0, 0.0)),
     mca.Force: mca.Force(body="low", nodes="ymin", force=(1.0, 0.0, 0.0)),
     mca.BodyForce: mca.BodyForce(body="low", acceleration=(1.0, 0.0, 0.0)),
+    mca.ThermalStrain: mca.ThermalStrain(body="low", expansion=1e-5, temperature=1.0),
     mca.Absorbing: mca.Absorbing(body="low", nodes="ymin", centre=(0.0, 0.0, 0.0)),
     mca.Tip: TIP,
     mca.RigidPhase: mca.RigidPhase(theta=(1.0,), theta_dot=(0.0,), tip=TIP, target=WALL, t_max=0.01),

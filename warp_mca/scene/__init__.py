@@ -13,7 +13,7 @@ from warp_mca.scene.contacts import OVERLAP_CHOICES, Contact, ContactAll, RigidP
 from warp_mca.scene.drives import Fixed, Prescribed
 from warp_mca.scene.friction_laws import DecayingFriction, ShearCap
 from warp_mca.scene.joints import Prismatic, Revolute, Spherical, Weld
-from warp_mca.scene.loads import BodyForce, Force, Pressure, Traction
+from warp_mca.scene.loads import BodyForce, Force, Pressure, ThermalStrain, Traction
 from warp_mca.scene.phases import BaseMotion, ImpactPhase, JointTorque, RigidPhase, Settle, Slide, Tip
 from warp_mca.scene.probes import Line, Path, Point
 from warp_mca.scene.scene import Scene
@@ -54,6 +54,7 @@ __all__ = [
     "Settle",
     "Slide",
     "Surface",
+    "ThermalStrain",
     "Tie",
     "Tip",
     "Traction",

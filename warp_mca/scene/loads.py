@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
-from types import NoneType
+from types import MappingProxyType, NoneType
 from typing import Any, ClassVar
 
 from warp_mca.base import validate
@@ -14,6 +14,7 @@ from warp_mca.scene.amplitude import CONSTANT, Amplitude
 
 Vec3 = tuple[float, float, float]
 MOST = 1e15  # Pa, N, m/s^2 that a load may have
+LARGEST = 0.2  # thermal strain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -217,4 +218,29 @@ class BodyForce(TimedLoad):
         _check_vector(self.title, acceleration=self.acceleration)
 
 
-LOADS: dict[str, type[Load]] = {kind.__name__: kind for kind in (Pressure, Traction, Force, BodyForce)}
+@dataclass(frozen=True, kw_only=True)
+class ThermalStrain(TimedLoad):
+    """Strain that a body would have if it were free, alike in all directions, as that of a change of temperature.
+
+    It sets press fits and the preload of bolts: a body that is made colder shrinks onto what it surrounds.
+
+    Attributes:
+        expansion: coefficient of thermal expansion [1/K].
+        temperature: change at factor 1 [K].
+    """
+
+    expansion: float
+    temperature: float
+    module = "warp_mca.physics.loads.thermal"
+    refuses = MappingProxyType({"multi_rate": "leave multi_rate out"})
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        validate.finite(self.title, expansion=self.expansion, temperature=self.temperature)
+        strain = abs(self.expansion * self.temperature) * max(map(abs, self.table.values))
+        if not strain <= LARGEST:
+            remedy = f"it makes a strain of {strain:.3g}; give one of {LARGEST:g} at most"
+            raise bad_value(f"{self.title}.temperature", self.temperature, remedy)
+
+
+LOADS: dict[str, type[Load]] = {kind.__name__: kind for kind in (Pressure, Traction, Force, BodyForce, ThermalStrain)}

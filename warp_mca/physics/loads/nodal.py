@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,11 +23,13 @@ class LoadedNodes:
 
     Attributes:
         node: on which it acts, shape (count,), int32.
+        on_nodes: whether it acts on any at all.
         scene: number of the scene in a batch.
     """
 
     node: NDArray[np.int32] = field(metadata=of("nodes"))
     scene: int = field(default=0, metadata=SCENE)
+    on_nodes: ClassVar[bool] = True
 
     def eigenvalues(self, mass: NDArray[np.float64]) -> NDArray[np.float64]:
         """What it adds at each of its nodes to the eigenvalue that bounds the stable step [1/s^2], shape (count,).
@@ -66,7 +69,7 @@ def _arrays(load: Load, parts: Assembly, start: float, added: NDArray[np.float64
     item = load.build(parts, start)
     if not isinstance(item, LoadedNodes):
         raise TypeError(f"build() gives a {type(item).__name__}, not a LoadedNodes")
-    if not (np.isin(item.node, np.arange(len(added))).all() and len(item.node)):
+    if not (np.isin(item.node, np.arange(len(added))).all() and (len(item.node) or not item.on_nodes)):
         raise IndexError(f"LoadedNodes.node names no node, or others than 0 to {len(added) - 1}")
     np.add.at(added, item.node, item.eigenvalues(parts.mass))
     return item
