@@ -84,6 +84,15 @@ def test_a_strain_that_is_there_from_the_start_keeps_the_balance():
     assert np.abs(impact.solver.model.mass @ impact.state.v.numpy()).max() < 1e-12
 
 
+def test_a_clamped_bar_settles_to_its_preload():
+    """A constant strain may come before the impact; then the bar is at rest, with the stress of its strain."""
+    rest = {"phases": (mca.Settle(duration=1e-3, tolerance=1e-8),), "loads": (replace(COLD, amplitude=None),)}
+    result = mca.run(cooled(fixed=ENDS, **rest))
+    impact = result.time > 0.0
+    assert result.paths[0].stress[impact, :, 0] == pytest.approx(-STEEL.E * STRAIN, rel=2e-3)
+    assert result["E_kinetic"][impact].max() < 1e-6 * result["E_internal"].max()
+
+
 def test_a_heated_body_leaves_others_alone():
     """A second block beside it, of the same kind, stays as it is."""
     other = replace(cooled().bodies[0], name="other", position=(0.0, 0.1, 0.0))
