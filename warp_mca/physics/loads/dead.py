@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from warp_mca.base.joining import AS_IS, joinable
 from warp_mca.kernels.loads.nodes import push_nodes
 from warp_mca.model.assembly import Assembly
-from warp_mca.physics.loads.faces import lone_corners
+from warp_mca.physics.loads.faces import corner_areas, lone_corners
 from warp_mca.physics.loads.pushed import PushedNodes, TimedNodes
 from warp_mca.scene.loads import BodyForce, Force
 from warp_mca.scene.probes import Point
@@ -55,6 +55,7 @@ def build(load: Force | BodyForce, assembly: Assembly) -> DeadLoad:
         node=node.astype(np.int32),
         times=np.array(load.table.times),
         values=np.array(load.table.values),
+        force=float(np.linalg.norm(vector) * share.sum()),
         share=share,
         vector=np.array(vector),
     )
@@ -70,26 +71,10 @@ def _shares(load: Force, assembly: Assembly) -> tuple[Index, Array]:
         return node, np.full(len(node), 1.0 / len(node))
     mesh = assembly.meshes[load.body]
     face, _ = mesh.surface(load.nodes)
-    area = _corner_areas(mesh.points[face], lone_corners(mesh, face))
+    area = corner_areas(mesh.points[face], lone_corners(mesh, face))
     node, place = np.unique(face, return_inverse=True)
     share = np.bincount(place.ravel(), area.ravel())
     return node + assembly.node_start[load.body], share / share.sum()
-
-
-def _corner_areas(x: Array, alone: Index) -> Array:
-    """Integral of each corner's shape function over faces [m^2], as `share_of_face`, shape (face_count, 4)."""
-    found = np.zeros(x.shape[:2])
-    signs = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
-    for xi, eta in signs / np.sqrt(3.0):
-        weight = 0.25 * (1.0 + signs[:, 0] * xi) * (1.0 + signs[:, 1] * eta)
-        slopes = 0.25 * np.stack([signs[:, 0] * (1.0 + signs[:, 1] * eta), signs[:, 1] * (1.0 + signs[:, 0] * xi)])
-        along, across = np.einsum("sa,fai->sfi", slopes, x)
-        found += np.linalg.norm(np.cross(along, across), axis=1)[:, None] * weight
-    part = alone >= 0
-    whole = 0.5 * found[part].sum(axis=1)
-    found[part] = whole[:, None] * (np.arange(4) < 3)
-    found[np.flatnonzero(part), alone[part]] = 0.0
-    return found
 
 
 class Stage(PushedNodes):

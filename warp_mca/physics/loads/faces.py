@@ -55,6 +55,22 @@ def lone_corners(mesh: Mesh, face: Index) -> Index:
     return np.where(within.sum(axis=1) == 2, within.argmin(axis=1), -1).astype(np.int32)
 
 
+def corner_areas(x: Array, alone: Index) -> Array:
+    """Integral of each corner's shape function over faces [m^2], as `share_of_face`, shape (face_count, 4)."""
+    found = np.zeros(x.shape[:2])
+    signs = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    for xi, eta in signs / np.sqrt(3.0):
+        weight = 0.25 * (1.0 + signs[:, 0] * xi) * (1.0 + signs[:, 1] * eta)
+        slopes = 0.25 * np.stack([signs[:, 0] * (1.0 + signs[:, 1] * eta), signs[:, 1] * (1.0 + signs[:, 0] * xi)])
+        along, across = np.einsum("sa,fai->sfi", slopes, x)
+        found += np.linalg.norm(np.cross(along, across), axis=1)[:, None] * weight
+    part = alone >= 0
+    whole = 0.5 * found[part].sum(axis=1)
+    found[part] = whole[:, None] * (np.arange(4) < 3)
+    found[np.flatnonzero(part), alone[part]] = 0.0
+    return found
+
+
 def build(load: Pressure | Traction, assembly: Assembly) -> FaceLoad:
     """Arrays of a load.
 
@@ -63,7 +79,7 @@ def build(load: Pressure | Traction, assembly: Assembly) -> FaceLoad:
     """
     mesh = assembly.meshes[load.body]
     face, _ = mesh.surface(load.nodes)
-    own = (face + assembly.node_start[load.body]).astype(np.int32)
+    own, alone = (face + assembly.node_start[load.body]).astype(np.int32), lone_corners(mesh, face)
     if isinstance(load, Pressure):
         mode, traction = PRESSURE, (0.0, 0.0, -load.pressure)
     else:
@@ -72,8 +88,9 @@ def build(load: Pressure | Traction, assembly: Assembly) -> FaceLoad:
         node=np.unique(own).astype(np.int32),
         times=np.array(load.table.times),
         values=np.array(load.table.values),
+        force=float(np.linalg.norm(traction) * corner_areas(mesh.points[face], alone).sum()),
         face=own,
-        alone=lone_corners(mesh, face),
+        alone=alone,
         traction=np.array(traction),
         mode=mode,
     )

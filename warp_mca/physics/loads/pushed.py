@@ -30,10 +30,17 @@ class TimedNodes(LoadedNodes):
 
     Attributes:
         times, values: of the factor [s], [-], shape (entry_count,), float64.
+        force: size of the force at factor 1 and at the start [N].
     """
 
     times: NDArray[np.float64] = field(metadata=AS_IS)
     values: NDArray[np.float64] = field(metadata=AS_IS)
+    force: float = field(default=0.0, metadata=AS_IS)
+
+    def impulse(self, duration: float) -> float:
+        """As in `LoadedNodes`: force times the integral of the factor's size, taken as straight between its times."""
+        t = np.unique(np.clip([0.0, *self.times, duration], 0.0, duration))
+        return self.force * float(np.trapezoid(np.abs(np.interp(t, self.times, self.values)), t))
 
 
 @dataclass(eq=False)
