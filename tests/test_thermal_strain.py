@@ -21,7 +21,7 @@ ENDS = tuple(mca.Fixed(body="block", nodes=name, axes="x") for name in ("xmin", 
 COLD = mca.ThermalStrain(body="block", expansion=12e-6, temperature=-100.0, amplitude=mca.Amplitude.smooth_step(4e-5))
 
 
-def cooled(element: str = "hex8i", kinematics: str = "corotational", material: Any = STEEL, **change: Any) -> mca.Scene:
+def cooled(element: str = "hex8i", kinematics: Any = "corotational", material: Any = STEEL, **change: Any) -> mca.Scene:
     box = mca.Box(size=SIZE, divisions=(4, 2, 2))
     body = mca.Body(name="block", geometry=box, material=material, element=element, kinematics=kinematics)
     middle = mca.Line(body="block", start=(0.0, 0.005, 0.005), end=(0.02, 0.005, 0.005))

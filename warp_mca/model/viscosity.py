@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -84,12 +84,14 @@ def thermal_strains(parts: Assembly) -> Array | None:
 
 def thermal_energy(model: Model) -> float:
     """Energy that it takes to press all thermal strains of a model back at their greatest [J]; 0 without any."""
-    total, loads = 0.0, model.loads.get(ThermalStrain.__name__, ())
+    total = 0.0
+    loads: Sequence[Any] = model.loads.get(ThermalStrain.__name__, ())
     greatest = np.array([abs(load.strain) * np.abs(load.values).max() for load in loads])
-    for block in (block for block in model.blocks if block.thermal is not None):
-        load, volume = block.thermal[0].astype(int), block.thermal[1]
-        strain = np.where(load >= 0, greatest[load], 0.0)
-        total += float((4.5 * model.law[block.material, 0] * volume * strain**2).sum())
+    for block in model.blocks:
+        if block.thermal is not None:
+            load, volume = block.thermal[0].astype(int), block.thermal[1]
+            strain = np.where(load >= 0, greatest[load], 0.0)
+            total += float((4.5 * model.law[block.material, 0] * volume * strain**2).sum())
     return total
 
 

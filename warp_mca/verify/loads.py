@@ -183,7 +183,7 @@ def impulse_of_a_table(setup: Setup) -> list[Row]:
     size, m = 0.01, RHO * 1e-6
     table = mca.Amplitude(times=(1.3e-6, 7.9e-6, 8.1e-6, 29e-6), values=(0.0, 1.0, -0.3, 0.0))
     impulse = 1e4 * float(np.trapezoid(table.values, table.times))
-    mesh = mca.Box(size=(size,) * 3, divisions=(2, 2, 2)).build()
+    mesh = mca.Box(size=(size, size, size), divisions=(2, 2, 2)).build()
     mesh.node_sets["all"] = np.arange(len(mesh.points), dtype=np.int32)
     found = []
     for load in (

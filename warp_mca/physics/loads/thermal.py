@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -11,10 +11,11 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
 from warp_mca.base.joining import AS_IS, joinable, offsets
 from warp_mca.kernels.loads.thermal import Heated, Kept, heat_kernel, work_kernel
-from warp_mca.model.assembly import Assembly
+from warp_mca.model.assembly import Assembly, Block
 from warp_mca.physics.actor import When
 from warp_mca.physics.loads.nodal_stage import NodalLoad
 from warp_mca.physics.loads.pushed import TimedNodes, tables_of
@@ -23,6 +24,7 @@ from warp_mca.step.stage import Stage as StepStage
 from warp_mca.step.stage import Step
 
 if TYPE_CHECKING:
+    from warp_mca.physics.elements.stage import ElementStage
     from warp_mca.step.solver import Solver
     from warp_mca.step.state import State
 
@@ -77,34 +79,40 @@ def build(load: ThermalStrain, assembly: Assembly) -> HeatedBody:
     return HeatedBody(node=np.zeros(0, np.int32), times=times, values=values, strain=load.expansion * load.temperature)
 
 
+def _heated(block: Block) -> tuple[Index, Index, Array] | None:
+    """Heated elements of a block, the thermal strain of each and its volume [m^3]; None where there is none."""
+    if block.thermal is None:
+        return None
+    own = np.flatnonzero(block.thermal[0] >= 0.0).astype(np.int32)
+    return own, block.thermal[0, own].astype(np.int32), block.thermal[1, own]
+
+
 class Stage(NodalLoad):
     """Device side of thermal strains: their elements, block by block."""
 
     def __init__(self, solver: Solver, name: str) -> None:
         """Allocate on the current device."""
         model = solver.model
-        items = model.loads[name]
-        parts = [np.flatnonzero(block.thermal[0] >= 0) if block.heated else [] for block in model.blocks]
-        loads = [block.thermal[0, own].astype(int) for block, own in zip(model.blocks, parts, strict=True) if len(own)]
-        scene = np.array([item.scene for item in items])[np.concatenate(loads)]
+        items: Sequence[Any] = model.loads[name]
+        parts = [own for block in model.blocks if (own := _heated(block)) is not None]
+        scene = np.array([item.scene for item in items])[np.concatenate([load for _, load, _ in parts])]
         self._counts = np.bincount(scene, minlength=solver.layout.count).astype(np.int32)
         place = np.empty(len(scene), dtype=np.int32)
         place[np.argsort(scene, kind="stable")] = np.arange(len(scene), dtype=np.int32)
         super().__init__(solver, name)
         self.tables, self.entry = tables_of(items), wp.zeros(self.count, dtype=wp.float64)
         strain = wp.array([item.strain for item in items], dtype=wp.float64)
-        ends = offsets([len(own) for own in parts])
-        self.parts: list[tuple[Any, Heated]] = []
-        for index, (block, own) in enumerate(zip(model.blocks, parts, strict=True)):
-            if len(own):
-                assert block.thermal is not None
-                found = Heated()
-                found.element = wp.array(own, dtype=wp.int32)
-                found.load = wp.array(block.thermal[0, own], dtype=wp.int32)
-                found.place = wp.array(place[ends[index] : ends[index + 1]], dtype=wp.int32)
-                found.volume = wp.array(block.thermal[1, own], dtype=wp.float64)
-                found.strain = strain
-                self.parts.append((solver.elements[index], found))
+        stages = [stage for stage in solver.elements if stage.block.heated]
+        ends = offsets([len(own) for own, _, _ in parts])
+        self.parts: list[tuple[ElementStage, Any]] = []
+        for k, (stage, (own, load, volume)) in enumerate(zip(stages, parts, strict=True)):
+            found = Heated()
+            found.element = wp.array(own, dtype=wp.int32)
+            found.load = wp.array(load, dtype=wp.int32)
+            found.place = wp.array(place[ends[k] : ends[k + 1]], dtype=wp.int32)
+            found.volume = wp.array(volume, dtype=wp.float64)
+            found.strain = strain
+            self.parts.append((stage, found))
 
     def counts(self) -> NDArray[np.int32]:
         """Heated elements of each scene."""
@@ -115,7 +123,7 @@ class Stage(NodalLoad):
         kept = {name: wp.zeros(self.count, dtype=wp.float64) for name in ("strain", "before", "stress", "work")}
         return ThermalState(**kept, clock=wp.zeros(self.count, dtype=wp.int32))
 
-    def _kind(self, element: Any) -> tuple[str, bool]:
+    def _kind(self, element: ElementStage) -> tuple[str, bool]:
         return self.solver.precision, element.block.finite
 
     def record_kernels(self) -> list[Any]:
