@@ -229,6 +229,14 @@ def test_what_does_not_fit_is_refused_by_name():
         mca.Amplitude.half_sine(0.0)
 
 
+def test_times_that_count_from_the_touch_are_refused_where_nobody_knows_it():
+    link = mca.make_scene("two_link")
+    with pytest.raises(mca.RequestError, match=r"BodyForce of OA.amplitude = .given.: its times count from the touch"):
+        mca.run(replace(link, loads=(replace(FIELD, body="OA"),)), method="pure-fem")
+    with pytest.raises(mca.RequestError, match=r"Scene.t_end = 1.0: loads act in an impact alone"):
+        replace(link, loads=(replace(FIELD, body="OA"),), t_end=1.0)
+
+
 def test_curves_are_what_they_are_called():
     pulse, step = mca.Amplitude.half_sine(2e-3, start=1e-3), mca.Amplitude.smooth_step(1e-3)
     t, values = np.array(pulse.times), np.array(pulse.values)
