@@ -36,6 +36,7 @@ PAGES = (
     "how-to/materials.md",
     "how-to/rigid_plane.md",
     "how-to/boundary.md",
+    "how-to/loads.md",
     "how-to/units.md",
     "how-to/stopped.md",
 )

@@ -17,6 +17,7 @@ from warp_mca import geometry, scene
 from warp_mca.base.errors import GuardError, RequestError
 from warp_mca.scene import materials
 from warp_mca.scene.joints import Joint
+from warp_mca.scene.loads import Load
 from warp_mca.verify.metals import METALS
 
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
@@ -60,6 +61,12 @@ SOUND: dict[type, Any] = {
     mca.Prismatic: mca.Prismatic(name="P", body="up", nodes="ymax", axis=(1.0, 0.0, 0.0)),
     mca.Fixed: mca.Fixed(body="low", nodes="ymin"),
     mca.Prescribed: mca.Prescribed(body="low", nodes="ymin", axis="x", times=(0.0, 1.0), velocities=(0.0, 1.0)),
+    mca.Amplitude: mca.Amplitude(times=(0.0, 1.0), values=(0.0, 1.0)),
+    mca.Pressure: mca.Pressure(body="low", nodes="ymin", pressure=1e5),
+    mca.Traction: mca.Traction(body="low", nodes="ymin", traction=(1e5, 0.0, 0.0)),
+    mca.Force: mca.Force(body="low", nodes="ymin", force=(1.0, 0.0, 0.0)),
+    mca.BodyForce: mca.BodyForce(body="low", acceleration=(1.0, 0.0, 0.0)),
+    mca.ThermalStrain: mca.ThermalStrain(body="low", expansion=1e-5, temperature=1.0),
     mca.Absorbing: mca.Absorbing(body="low", nodes="ymin", centre=(0.0, 0.0, 0.0)),
     mca.Tip: TIP,
     mca.RigidPhase: mca.RigidPhase(theta=(1.0,), theta_dot=(0.0,), tip=TIP, target=WALL, t_max=0.01),
@@ -166,6 +173,10 @@ def scene_with(item: Any) -> mca.Scene:
             change = {"bodies": (dataclasses.replace(low, geometry=item), up)}
         case mca.Body():
             change = {"bodies": (item, up)}
+        case mca.Amplitude():
+            change = {"loads": (dataclasses.replace(SOUND[mca.Pressure], amplitude=item),)}
+        case Load():
+            change = {"loads": (item,)}
         case Joint():
             change = {"joints": (item,)}
         case mca.Penalty() | mca.DampedPenalty():

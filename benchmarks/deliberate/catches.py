@@ -72,4 +72,11 @@ CATCHES: dict[str, tuple[str, ...]] = {
     "rigid_pendulum_period": ("rigid_gravity_halved",),
     "rigid_double_pendulum": ("row_forgets_second", "rigid_gravity_halved"),
     "rigid_ball": ("reaction_halved", "contact_soft"),
+    "pressure_pulse": ("pressure_on_faces_halved",),
+    "pressed_sphere": ("pressure_on_faces_halved",),
+    "breathing_shell": ("pressure_on_faces_halved",),
+    "tip_force": ("nodal_force_raised",),
+    "impulse_of_a_table": ("load_of_an_instant", "nodal_force_raised"),
+    "cooled_bar": ("thermal_strain_halved",),
+    "press_fit": ("thermal_strain_halved",),
 }

@@ -32,7 +32,7 @@ wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def force_kernel(precision: str, law_name: str, finite: bool = False, viscous: bool = False) -> Any:
+def force_kernel(precision: str, law_name: str, finite: bool = False, viscous: int = 0) -> Any:
     """Kernel: forces of each element on its nodes, and the plastic history where there is a law.
 
     Every plastic element takes the return map, which suits a CPU that computes several elements side by side; a GPU

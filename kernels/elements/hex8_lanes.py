@@ -149,7 +149,7 @@ def point_functions(precision: str, law_name: str) -> tuple[Any, Any, Any, Any]:
 
 
 @cache
-def flow_function(precision: str, law_name: str, viscous: bool = False) -> Any:
+def flow_function(precision: str, law_name: str, viscous: int = 0) -> Any:
     """The function by which four lanes compute an element of a patch, of which the first keeps bulk viscosity."""
     t = scalars(precision)
     R, mat33 = t.real, t.mat33
@@ -161,7 +161,7 @@ def flow_function(precision: str, law_name: str, viscous: bool = False) -> Any:
     size, last = HISTORY_SIZE, HISTORY_SIZE - 1
     read_row, write_row = row_functions(precision, 2 * size)
     keep_strain, _, strain_square = keep_functions(R)
-    scale, viscous_pressure = LINE_SCALE**3, viscosity_function(precision, False)
+    scale, viscous_pressure = LINE_SCALE**3, viscosity_function(precision, False, viscous or 1)
 
     @wp.func
     def pressure_of(K: R, dilatation: R, volume: R, e: int, first: bool, dt: R, extreme_out: wp.array2d(dtype=R)):

@@ -22,7 +22,7 @@ wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def element(precision: str, law_name: str, viscous: bool = False) -> PatchElement:
+def element(precision: str, law_name: str, viscous: int = 0) -> PatchElement:
     """A thread's element as if elastic, and listed if it yields: lanes then compute its bulk viscosity, too."""
     t = scalars(precision)
     R, mat33, mat83 = t.real, t.mat33, t.mat83

@@ -60,7 +60,7 @@ def shared_functions(precision: str, finite: bool) -> tuple[Any, Any]:
 
 
 @cache
-def points_force_kernel(precision: str, law_name: str, finite: bool, viscous: bool) -> Any:
+def points_force_kernel(precision: str, law_name: str, finite: bool, viscous: int) -> Any:
     """The force kernel: volumes first, because the pressure's direction varies within an element at finite strain.
 
     All points share the mean dilatation. The pressure of a law of flow follows from it; that of a general law is the

@@ -70,7 +70,7 @@ def stress_functions(precision: str) -> tuple[Any, Any, Any, Any]:
 
 
 @cache
-def small_strain_function(precision: str, law_name: str, viscous: bool = False) -> Any:
+def small_strain_function(precision: str, law_name: str, viscous: int = 0) -> Any:
     """The function that gives the corner forces of an element, and the greatest S : S / 2 of a point.
 
     It takes corners, local displacements and frame W; the material m and its K and G; where there is a law, the history

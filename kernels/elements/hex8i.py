@@ -36,7 +36,7 @@ def lags(law: Law, finite: bool) -> bool:
 
 
 @cache
-def force_kernel(points: int, precision: str, law_name: str, finite: bool = False, viscous: bool = False) -> Any:
+def force_kernel(points: int, precision: str, law_name: str, finite: bool = False, viscous: int = 0) -> Any:
     """Kernel: forces of each element on its nodes [N], and the history."""
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
@@ -49,7 +49,7 @@ def force_kernel(points: int, precision: str, law_name: str, finite: bool = Fals
     points_stress = hex8i_points.stress_function(precision, law_name, finite, points)
     elastic_stress = elastic_function(precision, points)
     flow_stress = stress_function(precision, law_name, points) if plastic else None
-    k, viscous_pressure = kinematics(precision, finite), viscosity_function(precision, finite)
+    k, viscous_pressure = kinematics(precision, finite), viscosity_function(precision, finite, viscous or 1)
     dilatation_of, nominal = k.dilatation, k.nominal
 
     # fast math would lose the digits of ln(1 + x) of small x

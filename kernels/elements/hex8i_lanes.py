@@ -15,7 +15,7 @@ from warp_mca.kernels.elements.internal_modes import PLANE, mode_functions, plac
 from warp_mca.kernels.elements.patch import POINT, Patches
 from warp_mca.kernels.elements.patch_element import material_of
 from warp_mca.kernels.elements.patterns import VOLUME_SCALE, mean_functions
-from warp_mca.kernels.elements.viscosity import VISCOUS_PRESSURE
+from warp_mca.kernels.elements.viscosity import kept_pressure_function
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.hardware.shared_memory import ROW, row_functions, warp_barrier
 from warp_mca.kernels.materials.laws import law_functions
@@ -160,13 +160,13 @@ def sums_function(precision: str) -> Any:
 
 
 @cache
-def flow_function(points: int, precision: str, law_name: str, viscous: bool = False) -> Any:
+def flow_function(points: int, precision: str, law_name: str, viscous: int = 0) -> Any:
     """The function by which two lanes compute an element of a patch."""
     R, point = scalars(precision).real, POINT[precision]
     _, _, vector_sum, lane_max = lane_functions(precision)
     column_place, _ = place_functions(precision, points)
     plastic_parts, flow_column = column_functions(points, precision, law_name)
-    modes = mode_functions(precision)
+    modes, kept_pressure = mode_functions(precision), kept_pressure_function(precision, viscous)
     frame, whole = modes.frame, modes.whole
     stress_modes, conjugate = stress_modes_function(precision), conjugate_function(precision)
     lane_sums, kept, (load_patterns, store_lane_forces) = (
@@ -235,7 +235,7 @@ def flow_function(points: int, precision: str, law_name: str, viscous: bool = Fa
             wp.atomic_add(extreme_out, LAG_LOSS, e, volume * lost)  # which waits for nothing
         Q = conjugate(x, volume, y, R0, R1, R2, p, w)
         if wp.static(viscous):
-            pressure = pressure + extreme_out[VISCOUS_PRESSURE, e]
+            pressure = pressure + kept_pressure(e, extreme_out)
         if valid:
             store_lane_forces(x, b, volume, W, whole(mean, pressure), Q, right, lane, thread, force_out)
         return flows

@@ -43,7 +43,7 @@ def keep_function(precision: str) -> Any:
 
 
 @cache
-def element(points: int, precision: str, law_name: str, viscous: bool = False) -> PatchElement:
+def element(points: int, precision: str, law_name: str, viscous: int = 0) -> PatchElement:
     """A thread's element as if elastic, and listed if it yields: lanes then add the viscous pressure that is kept."""
     t = scalars(precision)
     R, mat73 = t.real, t.mat73
@@ -51,7 +51,7 @@ def element(points: int, precision: str, law_name: str, viscous: bool = False) -
     load_patterns, load_displacement_patterns = pattern_load_functions(precision)
     shape_and_strain, corner_forces = pattern_strain_function(precision, False), corner_force_function(precision)
     frame, elastic_stress = mode_functions(precision).frame, elastic_function(precision, points)
-    keep, viscous_pressure = keep_function(precision), viscosity_function(precision, False)
+    keep, viscous_pressure = keep_function(precision), viscosity_function(precision, False, viscous or 1)
     _, keep_forces, *_ = sum_functions(precision)
     keep_strain, keep_volume, strain_square = keep_functions(R)
 

@@ -43,7 +43,7 @@ def kept(law: Law, finite: bool) -> tuple[str, ...]:
 
 
 @cache
-def stress_function(precision: str, law_name: str, finite: bool, viscous: bool = False) -> Any:
+def stress_function(precision: str, law_name: str, finite: bool, viscous: int = 0) -> Any:
     """The function that gives stress and hourglass forces of an element, with plastic flow; it keeps the strain.
 
     A larger function, or a matrix that changes within a branch, would prevent vectorisation on a CPU.
@@ -113,7 +113,7 @@ def stress_function(precision: str, law_name: str, finite: bool, viscous: bool =
 
 
 @cache
-def force_kernel(precision: str, law_name: str, finite: bool = False, viscous: bool = False) -> Any:
+def force_kernel(precision: str, law_name: str, finite: bool = False, viscous: int = 0) -> Any:
     """Kernel: forces of each element on its nodes, and the plastic history where there is a law."""
     t = scalars(precision)
     R, vec3 = t.real, t.vec3

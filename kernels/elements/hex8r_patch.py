@@ -15,7 +15,7 @@ wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def element(precision: str, law_name: str, viscous: bool = False) -> PatchElement:
+def element(precision: str, law_name: str, viscous: int = 0) -> PatchElement:
     """Stress, bulk viscosity, plastic flow and forces."""
     t = scalars(precision)
     R, mat73 = t.real, t.mat73

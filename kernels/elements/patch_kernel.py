@@ -66,7 +66,7 @@ class PatchElement:
     lanes: int = 1
 
 
-Maker = Callable[[str, str, bool], PatchElement]  # of a precision, a law, and whether elements are viscous
+Maker = Callable[[str, str, int], PatchElement]  # of a precision, a law, and what joins the pressure
 
 
 @wp.func
@@ -115,7 +115,7 @@ def listed_function(precision: str, flow: Any, lanes: int) -> Any:
 
 
 @cache
-def patch_force_kernel(maker: Maker, precision: str, law_name: str, viscous: bool = False) -> Any:
+def patch_force_kernel(maker: Maker, precision: str, law_name: str, viscous: int = 0) -> Any:
     """Kernel: the forces of each patch on its nodes, bulk viscosity and, where there is a law, the plastic history.
 
     flowing_out has the number of elements of each patch that took the return map, shape (patch_count,), where the

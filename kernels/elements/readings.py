@@ -6,6 +6,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.elements.formulation import MEAN, NODAL, OWN, Maker, load_function, parts_of
+from warp_mca.kernels.elements.viscosity import THERMAL
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.materials.kinematics import kinematics
 from warp_mca.kernels.records.extremes import LAG_LOSS, STRAIN_SQUARE, VOLUME_LOSS
@@ -14,19 +15,23 @@ wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def shared_function(maker: Maker, precision: str, law_name: str, finite: bool) -> Any:
-    """The function (struct, e, K, group, dilatation) -> what points share.
+def shared_function(maker: Maker, precision: str, law_name: str, finite: bool, heated: bool = False) -> Any:
+    """The function (struct, e, K, swelling, group, dilatation) -> what points share.
 
-    (J - 1 and pressure [Pa] of the mean; pressure and its energy [J] of pressure nodes; 0 where there is none.)
+    (J - 1 and pressure [Pa] of the mean; pressure and its energy [J] of pressure nodes; 0 where there is none.) The
+    energy is that of the volume strain less `swelling` where elements are `heated`.
     """
     form, _, _ = parts_of(maker, precision, law_name, finite)
     struct, gradient, points, corners = form.struct, form.gradient, form.points, form.corners
     k, R = kinematics(precision, finite), scalars(precision).real
     dilatation_of, pressure_of, volumetric_energy = k.dilatation, k.pressure, k.volumetric_energy
     mean, nodal, share = form.pressure == MEAN, form.pressure == NODAL, 1.0 / corners
+    _, elastic_dilatation = swelling_functions(precision, finite, heated)
 
     @wp.func
-    def shared_by_points(shape: struct, e: int, K: R, group: wp.array2d(dtype=wp.int32), dilatation: wp.array(dtype=R)):
+    def shared_by_points(
+        shape: struct, e: int, K: R, swelling: R, group: wp.array2d(dtype=wp.int32), dilatation: wp.array(dtype=R)
+    ):
         theta = R(0.0)
         pressure = R(0.0)
         energy = R(0.0)
@@ -41,7 +46,7 @@ def shared_function(maker: Maker, precision: str, law_name: str, finite: bool) -
         if wp.static(nodal):
             for a in range(wp.static(corners)):
                 pressure += R(share) * pressure_of(K, dilatation[group[a, e]])
-                energy += R(share) * volumetric_energy(K, dilatation[group[a, e]])
+                energy += R(share) * volumetric_energy(K, elastic_dilatation(dilatation[group[a, e]], swelling))
             weight, H = gradient(shape, 0)
             energy = weight * energy
         return theta, pressure, energy
@@ -50,7 +55,30 @@ def shared_function(maker: Maker, precision: str, law_name: str, finite: bool) -
 
 
 @cache
-def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = False) -> Any:
+def swelling_functions(precision: str, finite: bool, heated: bool) -> tuple[Any, Any]:
+    """Functions (e, K, extreme) -> volume strain of a thermal strain; (J - 1, that) -> J - 1 without it [-]."""
+    R = scalars(precision).real
+
+    @wp.func
+    def swelling_of(e: int, K: R, extreme: wp.array2d(dtype=R)):
+        if wp.static(heated):
+            return extreme[THERMAL, e] / K
+        return R(0.0)
+
+    @wp.func
+    def elastic_dilatation(theta: R, swelling: R):
+        if wp.static(not heated):
+            return theta
+        if wp.static(finite):
+            J = wp.float64(1.0) + wp.float64(theta)
+            return R(J * wp.exp(-wp.float64(swelling)) - wp.float64(1.0))
+        return theta - swelling
+
+    return swelling_of, elastic_dilatation
+
+
+@cache
+def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = False, heated: bool = False) -> Any:
     """Kernel: elastic, plastic and hourglass energy [J], greatest strain and smallest Jacobian ratio [-] so far.
 
     The points' own Jacobians are those of this step; of the steps between, the force kernels keep that of the centre.
@@ -59,7 +87,8 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
     form, point, place = parts_of(maker, precision, law_name, finite)
     load = load_function(maker, precision, law_name, finite)
     gradient, rotation, modes, points = form.gradient, form.rotation, form.modes, form.points
-    shared, own = shared_function(maker, precision, law_name, finite), form.pressure == OWN
+    shared, own = shared_function(maker, precision, law_name, finite, heated), form.pressure == OWN
+    swelling_of, elastic_dilatation = swelling_functions(precision, finite, heated)
     plastic, general, read = bool(law_name), point.general, point.read
     has_modes, lags = form.modes is not None, form.lags
     late = form.pressure == MEAN and not general  # one pass over the points: a second would not fit side by side
@@ -90,10 +119,9 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
             flag = yielded[e]
         shape = load(X, u, conn, e, m, flag, law, history)
         identity = wp.identity(n=3, dtype=R)
-        theta = R(0.0)
-        elastic = R(0.0)
+        theta, elastic, swelling = R(0.0), R(0.0), swelling_of(e, K, extreme)
         if wp.static(not late):
-            theta, _pressure, elastic = shared(shape, e, K, group, dilatation)
+            theta, _pressure, elastic = shared(shape, e, K, swelling, group, dilatation)
         volume = R(0.0)
         growth = R(0.0)
         dissipated = R(0.0)
@@ -110,12 +138,12 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
                 growth += dilatation_of(H) * weight
             _S, _pressure, _p, stored, spent = read(strain, theta, G, place(g), e, m, flag, law, history)
             if wp.static(own and not general):
-                stored += volumetric_energy(K, theta)
+                stored += volumetric_energy(K, elastic_dilatation(theta, swelling))
             elastic += weight * stored
             dissipated += weight * spent
             smallest = wp.min(smallest, wp.determinant(identity + H))
         if wp.static(late):
-            elastic += volume * volumetric_energy(K, growth / volume)
+            elastic += volume * volumetric_energy(K, elastic_dilatation(growth / volume, swelling))
         energy_out[0, first + e] = elastic
         energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * largest)
         smallest = wp.min(smallest * wp.determinant(identity + rotation(shape)), R(1.0) - extreme[VOLUME_LOSS, e])
@@ -171,7 +199,7 @@ def stress_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
             flag = yielded[e]
         shape = load(X, u, conn, e, m, flag, law, history)
         Q = wp.identity(n=3, dtype=R) + rotation(shape)
-        theta, mean_pressure, _energy = shared(shape, e, K, group, dilatation)
+        theta, mean_pressure, _energy = shared(shape, e, K, R(0.0), group, dilatation)
         for g in range(wp.static(points)):
             _weight, H = gradient(shape, g)
             strain, N, d = deviator(H)

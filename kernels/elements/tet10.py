@@ -146,7 +146,7 @@ def spread_functions(precision: str) -> tuple[Any, Any, Any]:
 
 
 @cache
-def pressure_function(precision: str, finite: bool, mean: bool, viscous: bool) -> Any:
+def pressure_function(precision: str, finite: bool, mean: bool, viscous: int) -> Any:
     """The function (struct, K, e, dt, extreme_out) -> mean dilatation [-], its pressure [Pa], volume [m^3], q [Pa].
 
     The first three are 0 without need of them.
@@ -177,7 +177,7 @@ def pressure_function(precision: str, finite: bool, mean: bool, viscous: bool) -
 
 
 @cache
-def tet10_force_kernel(maker: Maker, precision: str, law_name: str, finite: bool = False, viscous: bool = False) -> Any:
+def tet10_force_kernel(maker: Maker, precision: str, law_name: str, finite: bool = False, viscous: int = 0) -> Any:
     """Kernel: forces of each element on its nodes, and the plastic history where there is a law.
 
     A general law gives the pressure of each point; its mean, which is conjugate to the mean dilatation, is known behind

@@ -108,7 +108,7 @@ def average_kernel(precision: str) -> Any:
 
 
 @cache
-def force_kernel(precision: str, law_name: str, finite: bool = False, viscous: bool = False) -> Any:
+def force_kernel(precision: str, law_name: str, finite: bool = False, viscous: int = 0) -> Any:
     """Kernel: forces of each element on its nodes, and the plastic history where there is a law."""
     t = scalars(precision)
     R, vec3 = t.real, t.vec3

@@ -61,13 +61,17 @@ def formulation(precision: str, law_name: str, finite: bool) -> Formulation:
 
 
 @cache
-def viscous_function(precision: str, law_name: str, finite: bool, viscous: bool) -> Any:
+def viscous_function(precision: str, law_name: str, finite: bool, viscous: int) -> Any:
     """The function (f, shape, e, dt, extreme_out) -> forces on the corners [N] with those of bulk viscosity, if any."""
     t, k = scalars(precision), kinematics(precision, finite)
     R, vec3, mat33, mat53, mat63 = t.real, t.vec3, t.mat33, wp.types.matrix((5, 3), t.real), t.mat63
     Wedge6, _, _, _ = shape_functions(precision, law_name, finite)
     _, to_corners = pattern_functions(precision)
-    dilatation_of, nominal, viscous_pressure = k.dilatation, k.nominal, viscosity_function(precision, finite)
+    dilatation_of, nominal, viscous_pressure = (
+        k.dilatation,
+        k.nominal,
+        viscosity_function(precision, finite, viscous or 1),
+    )
 
     @wp.func
     def with_viscosity(f: mat63, shape: Wedge6, e: int, dt: R, extreme_out: wp.array2d(dtype=R)):
@@ -114,7 +118,7 @@ def vector_function(precision: str, law_name: str, finite: bool) -> Any:
 
 
 @cache
-def force_kernel(precision: str, law_name: str, finite: bool = False, viscous: bool = False) -> Any:
+def force_kernel(precision: str, law_name: str, finite: bool = False, viscous: int = 0) -> Any:
     """Kernel: forces of each element on its nodes, plastic history, and the inelastic part of the internal vector."""
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33

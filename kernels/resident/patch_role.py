@@ -41,7 +41,7 @@ ROUNDS = (max(SLOTS.values()) + THREADS - 1) // THREADS  # slots of a thread
 
 
 @cache
-def element_role(maker: Maker, precision: str, law_name: str, viscous: bool) -> Any:
+def element_role(maker: Maker, precision: str, law_name: str, viscous: int) -> Any:
     """The function that computes the elements of a patch by all threads of a block.
 
     Elements with a plastic law are computed as those that yield, whether they do or not.
@@ -127,7 +127,7 @@ def see_function(precision: str, turned: bool) -> Any:
 
 
 @cache
-def patch_role(maker: Maker, precision: str, law_name: str, viscous: bool, turned: bool) -> Any:
+def patch_role(maker: Maker, precision: str, law_name: str, viscous: int, turned: bool) -> Any:
     """The function that computes the forces of a patch in each of the kernel's steps.
 
     `turned`, in `mixed`: elements compute in floating frames.

@@ -54,7 +54,7 @@ def resident_kernel(
     maker: Maker,
     precision: str,
     law_name: str,
-    viscous: bool,
+    viscous: int,
     turned: bool,
     contact: bool,
     friction: bool,

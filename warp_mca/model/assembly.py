@@ -13,8 +13,9 @@ from warp_mca.base.errors import bad_value
 from warp_mca.geometry.cell_types import CELL_TYPES
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.kernels.elements.patch_layout import PATCH
+from warp_mca.kernels.elements.viscosity import HEATED, VISCOUS
 from warp_mca.model.stable_step import Elements, StableStep, at_elements, element_steps, stable_step
-from warp_mca.model.viscosity import viscosities
+from warp_mca.model.viscosity import thermal_strains, viscosities
 from warp_mca.physics.contact.stiffness import Inertia
 from warp_mca.physics.contact.surfaces import Faces, make_faces
 from warp_mca.physics.elements import Element
@@ -45,7 +46,9 @@ class Block:
         part_ends: where elements end that have one level of `Model.rates` and one chain, the least level of their
             nodes: levels one after the other, in each of them chains; empty with one rate.
         viscosity: c1 rho c h [Pa s] and c2^2 rho h^2 [Pa s^2] of each, see `kernels.elements.viscosity`, shape (2,
-            element_count), float64; None without bulk viscosity.
+            element_count), float64; None without bulk viscosity. Heated elements have it, of 0 if no other.
+        thermal: number of each element's thermal strain among those of `Model.loads`, -1 without, and volume [m^3],
+            shape (2, element_count), float64; None where no element has one.
     """
 
     element: str
@@ -57,12 +60,15 @@ class Block:
     ends: tuple[int, ...] = ()
     part_ends: tuple[int, ...] = ()
     viscosity: Array | None = None
+    thermal: Array | None = None
 
     def part(self, element: NDArray[np.intp]) -> Block:
         """A block of some of the elements by themselves."""
         viscosity = None if self.viscosity is None else self.viscosity[:, element]
+        thermal = None if self.thermal is None else self.thermal[:, element]
         conn, material = np.ascontiguousarray(self.conn[:, element]), self.material[element]
-        return replace(self, conn=conn, material=material, viscosity=viscosity, first=0, ends=(), part_ends=())
+        more = {"viscosity": viscosity, "thermal": thermal}
+        return replace(self, conn=conn, material=material, **more, first=0, ends=(), part_ends=())
 
     def without_viscosity(self) -> Block:
         """The block with coefficients of zero, if it has any: its kernels and its `kind` stay."""
@@ -72,6 +78,16 @@ class Block:
     def viscous(self) -> bool:
         """Whether they have bulk viscosity."""
         return self.viscosity is not None
+
+    @property
+    def heated(self) -> bool:
+        """Whether any of them has a thermal strain."""
+        return self.thermal is not None
+
+    @property
+    def joining(self) -> int:
+        """What joins their pressure, as `kernels.elements.viscosity` lists it; 0 for nothing."""
+        return HEATED if self.heated else VISCOUS if self.viscous else 0
 
     @property
     def level_ends(self) -> tuple[int, ...]:
@@ -85,9 +101,9 @@ class Block:
         return bool(self.law)
 
     @property
-    def kind(self) -> tuple[bool, str, str, bool, bool]:
-        """Key of the block: (not plastic, law, element, finite, viscous). Blocks of a model are sorted by it."""
-        return not self.plastic, self.law, self.element, self.finite, self.viscous
+    def kind(self) -> tuple[bool, str, str, bool, int]:
+        """Key of the block: (not plastic, law, element, finite, joining). Blocks of a model are sorted by it."""
+        return not self.plastic, self.law, self.element, self.finite, self.joining
 
 
 class Assembly:
@@ -170,6 +186,7 @@ class Assembly:
         """
         blocks, order = [], [np.zeros(0, dtype=np.int32)]
         every = [None if rigid else viscosities(self, k) for k in range(len(self.cells))]
+        heat = None if rigid else thermal_strains(self)
         for law in sorted({m.law for m in self.materials}, key=lambda law: (not law, law)):
             flowing = np.array([m.law == law for m in self.materials])[self.material]
             for part, viscosity in zip(self.cells, every, strict=True):
@@ -178,6 +195,10 @@ class Assembly:
                     if part.element.patches:
                         mine = mine[compact_order(self.X, part.conn[mine], PATCH)]
                     index = part.index[mine]
+                    thermal = None if heat is None or (heat[0, index] < 0).all() else heat[:, index]
+                    own = None if viscosity is None else viscosity[:, mine]
+                    if thermal is not None and own is None:
+                        own = np.zeros((2, len(mine)))
                     blocks.append(
                         Block(
                             element=part.element.name,
@@ -186,7 +207,8 @@ class Assembly:
                             conn=np.ascontiguousarray(part.conn[mine].T),
                             material=self.material[index],
                             first=first,
-                            viscosity=None if viscosity is None else viscosity[:, mine],
+                            viscosity=own,
+                            thermal=thermal,
                         )
                     )
                     order.append(index)

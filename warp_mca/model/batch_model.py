@@ -19,6 +19,7 @@ from warp_mca.physics.contact.skin_edges import EdgePass, no_edges
 from warp_mca.physics.contact.surfaces import ContactPass
 from warp_mca.physics.loads.nodal import check_batch
 from warp_mca.scene.contact_laws import DampedPenalty, Penalty
+from warp_mca.scene.loads import ThermalStrain
 
 # what the numbers in a model's arrays count, and how many of them a model has
 _COUNTS: dict[str, Callable[[Model], int]] = {
@@ -105,12 +106,14 @@ def _padded(passes: Sequence[ContactPass], edged: Collection[int]) -> tuple[Cont
 def _blocks(models: Sequence[Model], nodes: Index, elements: Index) -> tuple[tuple[Block, ...], Index, Index]:
     """Blocks of all scenes, the order of the elements in the joined meshes, and `Layout.elements`."""
     laws = offsets([len(model.law) for model in models])
+    strains = offsets([len(model.loads.get(ThermalStrain.__name__, ())) for model in models])
+    heated = np.stack([strains, np.zeros_like(strains)])
     # in the order that a scene alone has them in, so that sums over elements come out alike
     kinds = sorted({block.kind for model in models for block in model.blocks})
     blocks, order, first = [], [np.zeros(0, dtype=np.int32)], 0
     ranges = np.zeros((len(models), len(kinds), 2), dtype=np.int32)
     for column, kind in enumerate(kinds):
-        conn, material, viscosity, end = [], [], [], first
+        conn, material, viscosity, thermal, end = [], [], [], [], first
         for k, model in enumerate(models):
             ranges[k, column] = end
             for block in model.blocks:
@@ -119,6 +122,8 @@ def _blocks(models: Sequence[Model], nodes: Index, elements: Index) -> tuple[tup
                     conn.append(block.conn + nodes[k])
                     material.append(block.material + laws[k])
                     viscosity += [] if block.viscosity is None else [block.viscosity]
+                    if block.thermal is not None:
+                        thermal.append(block.thermal + heated[:, k : k + 1] * (block.thermal >= 0.0))
                     order.append(model.element_of[block.first : block.first + count] + elements[k])
                     end += count
             ranges[k, column, 1] = end
@@ -128,6 +133,7 @@ def _blocks(models: Sequence[Model], nodes: Index, elements: Index) -> tuple[tup
                 conn=np.ascontiguousarray(np.concatenate(conn, axis=1)),
                 material=np.concatenate(material),
                 viscosity=np.concatenate(viscosity, axis=1) if viscosity else None,
+                thermal=np.concatenate(thermal, axis=1) if thermal else None,
                 first=first,
                 ends=tuple((ranges[:, column, 1] - first).tolist()),
                 part_ends=(),  # of elements with steps of their own, which batches have not

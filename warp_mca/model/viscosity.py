@@ -1,10 +1,10 @@
-"""Owns bulk viscosity on the host: the coefficients of elements, and what it leaves of the stable step."""
+"""Owns what joins the pressure of elements: bulk viscosity, what it leaves of the stable step, thermal strains."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,9 +12,11 @@ from warp_mca.base.arrays import Array
 from warp_mca.base.chunks import CHUNK, chunks
 from warp_mca.base.errors import bad_value
 from warp_mca.model.stable_step import StableStep, with_dashpots
+from warp_mca.scene.loads import ThermalStrain
 
 if TYPE_CHECKING:
     from warp_mca.model.assembly import Assembly
+    from warp_mca.model.model import Model
     from warp_mca.physics.elements.cells import Cells
 
 LARGEST = 0.98  # share of the step that is stable for certain which a viscous model takes at most
@@ -57,6 +59,40 @@ def viscosities(parts: Assembly, k: int) -> Array | None:
     h, rho = element_lengths(mean_gradients, cells, parts.X, mass), parts.rho[cells.index]
     c = np.sqrt((parts.K[cells.index] + 4.0 / 3.0 * parts.G[cells.index]) / rho)
     return np.stack([linear * rho * c * h, quadratic**2 * rho * h**2])
+
+
+def thermal_strains(parts: Assembly) -> Array | None:
+    """`Block.thermal` of all elements of an assembly, in the order of the meshes, or None without.
+
+    Raises:
+        RequestError: elements of a heated body take no thermal strain.
+    """
+    loads = [load for load in parts.scene.loads if isinstance(load, ThermalStrain)]
+    if not loads:
+        return None
+    found = np.stack([np.full(parts.element_count, -1.0), parts.volume])
+    for k, load in enumerate(loads):
+        first = parts.element_start[load.body]
+        found[0, first : first + parts.meshes[load.body].cell_count] = k
+    for cells in parts.cells:
+        if not hasattr(cells.element, "mean_gradients") and (found[0, cells.index] >= 0.0).any():
+            remedy = f"its elements {cells.element.name} take no thermal strain; choose another element"
+            body = loads[int(found[0, cells.index].max())].body
+            raise bad_value("ThermalStrain.body", body, remedy)
+    return found
+
+
+def thermal_energy(model: Model) -> float:
+    """Energy that it takes to press all thermal strains of a model back at their greatest [J]; 0 without any."""
+    total = 0.0
+    loads: Sequence[Any] = model.loads.get(ThermalStrain.__name__, ())
+    greatest = np.array([abs(load.strain) * np.abs(load.values).max() for load in loads])
+    for block in model.blocks:
+        if block.thermal is not None:
+            load, volume = block.thermal[0].astype(int), block.thermal[1]
+            strain = np.where(load >= 0, greatest[load], 0.0)
+            total += float((4.5 * model.law[block.material, 0] * volume * strain**2).sum())
+    return total
 
 
 def share_of_step(parts: Assembly, velocity: Array) -> float:

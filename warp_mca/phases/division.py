@@ -9,6 +9,7 @@ import numpy as np
 
 from warp_mca.base.errors import bad_value
 from warp_mca.model.model import Model
+from warp_mca.physics.loads.nodal import load_speed
 from warp_mca.scene import Scene
 from warp_mca.step.steps import Steps
 
@@ -83,7 +84,7 @@ def _limits(scene: Scene, model: Model, interval: float, intervals: int) -> tupl
         )
     with np.errstate(over="ignore"):
         speed = max(float(np.linalg.norm(model.V, axis=1).max()), float(np.abs(model.V).max()))  # squares may be 0
-    driven = max((float(np.abs(drive.velocities).max()) for drive in scene.prescribed), default=0.0)
+    driven = max((float(np.abs(drive.velocity_table[1]).max()) for drive in scene.prescribed), default=0.0)
     driven = max([driven, *(float(np.abs(base.velocities).sum(axis=1).max()) for base in model.bases)])
     fastest = max(speed, driven) + float(np.linalg.norm(scene.gravity)) * interval * intervals
     far = float(np.abs(model.X).max())
@@ -101,6 +102,8 @@ def _limits(scene: Scene, model: Model, interval: float, intervals: int) -> tupl
         raise bad_value("speed of the bodies", speed, remedy)
     margins = [item.margin for item in model.passes if item.plane is None]
     searches = SPEED_RESERVE * fastest * interval / (0.5 * min(margins)) if margins else 1.0
+    if margins and (pushed := load_speed(model, interval * intervals)):
+        searches += min(SPEED_RESERVE * pushed * interval / (0.5 * min(margins)), interval / stable)
     if not searches * intervals <= MAX_STEPS:
         remedy = f"so fast, a run would search for contact more than {MAX_STEPS:.0e} times; check the unit [m/s]"
         raise bad_value("speed of the bodies", max(float(np.abs(model.V).max()), driven), remedy)

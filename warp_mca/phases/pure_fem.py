@@ -70,6 +70,10 @@ def _check(scene: Scene) -> None:
     if scene.prescribed:
         remedy = f"times of a Prescribed velocity count from the touch, which {METHOD} does not know; leave it out"
         raise bad_value("Scene.prescribed", scene.prescribed[0].body, remedy)
+    for load in scene.loads:
+        if load.counts_from_impact:
+            remedy = f"its times count from the touch, which {METHOD} does not know; leave the load out"
+            raise bad_value(f"{load.title}.amplitude", "given", remedy)
 
 
 def _result(course: Course, swing: FlexibleSwing) -> Result:

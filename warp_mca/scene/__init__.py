@@ -5,6 +5,7 @@ and the remedy. Nothing here meshes, allocates or imports Warp.
 """
 
 from warp_mca.scene.absorbing import Absorbing
+from warp_mca.scene.amplitude import Amplitude
 from warp_mca.scene.bodies import Body, Vec3
 from warp_mca.scene.bonds import Bond
 from warp_mca.scene.contact_laws import DampedPenalty, Penalty
@@ -12,6 +13,7 @@ from warp_mca.scene.contacts import OVERLAP_CHOICES, Contact, ContactAll, RigidP
 from warp_mca.scene.drives import Fixed, Prescribed
 from warp_mca.scene.friction_laws import DecayingFriction, ShearCap
 from warp_mca.scene.joints import Prismatic, Revolute, Spherical, Weld
+from warp_mca.scene.loads import BodyForce, Force, Pressure, ThermalStrain, Traction
 from warp_mca.scene.phases import BaseMotion, ImpactPhase, JointTorque, RigidPhase, Settle, Slide, Tip
 from warp_mca.scene.probes import Line, Path, Point
 from warp_mca.scene.scene import Scene
@@ -21,14 +23,17 @@ from warp_mca.scene.tied_surfaces import Tie
 __all__ = [
     "OVERLAP_CHOICES",
     "Absorbing",
+    "Amplitude",
     "BaseMotion",
     "Body",
+    "BodyForce",
     "Bond",
     "Contact",
     "ContactAll",
     "DampedPenalty",
     "DecayingFriction",
     "Fixed",
+    "Force",
     "ImpactPhase",
     "JointTorque",
     "Line",
@@ -36,6 +41,7 @@ __all__ = [
     "Penalty",
     "Point",
     "Prescribed",
+    "Pressure",
     "Prismatic",
     "Probe",
     "Revolute",
@@ -48,8 +54,10 @@ __all__ = [
     "Settle",
     "Slide",
     "Surface",
+    "ThermalStrain",
     "Tie",
     "Tip",
+    "Traction",
     "Vec3",
     "Weld",
 ]

@@ -187,8 +187,10 @@ class Scene:
             if type(phase) not in PHASES.values():
                 remedy = f"give {' or '.join(PHASES)}; register other classes by warp_mca.register"
                 raise bad_value(f"Scene.phases[{k}]", validate.brief(phase), remedy)
-        for name in ("rigid", "prescribed", "loads") if self.phases else ():
-            if getattr(self, name):
+        timed = {"rigid": self.rigid, "prescribed": self.prescribed}
+        timed |= {"loads": [load for load in self.loads if not load.is_constant]}
+        for name, given in timed.items() if self.phases else ():
+            if given:
                 raise bad_value(f"Scene.{name}", "given", "its times count from the impact; leave it or phases out")
 
     @property

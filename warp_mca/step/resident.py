@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from warp_mca.step.state import State
 
 STAGES = {
+    "nodes in floating frames",
     "element forces",
     "contact",
     "joints, driven nodes",
@@ -58,8 +59,7 @@ def surface_of(solver: Solver) -> ContactStage | None:
 
 def is_known(solver: Solver) -> bool:
     """Whether the kernel knows all that a model has."""
-    _frames, *groups = solver.groups  # frames it knows
-    stages = {stage.name for group in groups for stage in group if not stage.only_records}
+    stages = {stage.name for group in solver.groups for stage in group if not stage.only_records}
     if solver.model.rates:
         return False
     if not stages <= STAGES or solver.layout.count > 1 or len(solver.elements) > 1 or len(solver.contacts) > 1:
@@ -115,7 +115,7 @@ class Resident:
             patches.maker,
             solver.precision,
             block.law,
-            block.viscous,
+            block.joining,
             solver.nodes.kind.turned,
             contact is not None,
             friction,

@@ -65,7 +65,8 @@ class Workspace:
         self.u_seen = wp.zeros(model.node_count if model.floating else 0, dtype=wp.vec3d)
         # one slot more, without force, for nodes without elements
         self.force = wp.zeros(slots + bool(model.rigid_bodies), dtype=t.vec3)
-        self.nodal_force = wp.zeros(model.node_count if model.passes or model.loads else 0, dtype=wp.vec3d)
+        pushed = model.passes or any(len(item.node) for items in model.loads.values() for item in items)
+        self.nodal_force = wp.zeros(model.node_count if pushed else 0, dtype=wp.vec3d)
         kept = wp.get_device().is_cuda or model.rates is not None
         self.u_record = wp.zeros(model.node_count if kept else 0, dtype=wp.vec3d)
         self.v_before = wp.zeros(model.node_count, dtype=wp.vec3d)

@@ -12,7 +12,7 @@ from importlib import import_module
 from warp_mca.base.errors import bad_value
 from warp_mca.verify.case import CASES, Case, Level, Row, Setup, case
 
-GROUPS = ("elements", "material", "waves", "impact", "friction", "rigid")
+GROUPS = ("elements", "material", "waves", "impact", "friction", "rigid", "loads")
 FILES = (
     "elements",
     "bent",
@@ -36,6 +36,7 @@ FILES = (
     "rigid",
     "hinges",
     "rigid_bodies",
+    "loads",
 )
 
 __all__ = ["FILES", "GROUPS", "Case", "Level", "Row", "Setup", "case", "cases"]

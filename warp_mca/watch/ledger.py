@@ -34,6 +34,7 @@ from warp_mca.kernels.records.columns import (
     VISCOUS,
 )
 from warp_mca.model.columns import added_columns, column_count
+from warp_mca.model.viscosity import thermal_energy
 from warp_mca.step.records import SceneRecords
 from warp_mca.watch.guards import Reading, stop
 from warp_mca.watch.row import When
@@ -48,6 +49,7 @@ MIN_EXCHANGE = 1e-7  # share of all energy below which exchanged energy is not c
 MIN_FREE_EXCHANGE = 1e-4  # the same without contact: what turns on joints in `mixed` gains 5e-6 by rounding in 6 ms
 MOST = 2.0  # tolerances by which contact springs may be off, see `kernels.contact.balance`
 MOSTLY = 0.5  # share of the imbalance that one contact explains, from which on a stop names it
+HEAT = {"mixed": 1e-3, "float64": 1e-12}  # share of `thermal_energy` that counts as rounding: 10^4 times that of sums
 TURNED = 0.01  # angle from which on the rounding of float32 heats what turns [rad]
 
 
@@ -71,6 +73,7 @@ class Ledger:
             kept.peaks = np.zeros((len(model.passes), 2))
         self.spin = _spin(model)
         self.rounding = _rounding(model, steps.dt / (model.rates.substeps if model.rates else 1))
+        self.rounding += HEAT[precision] * thermal_energy(model)
 
     @property
     def contact_dt(self) -> float:

@@ -54,9 +54,9 @@ class PatchStage(ElementStage):
     ) -> None:
         """Allocate; `patch_kernels` makes the force kernel and the element, other arguments as `ElementStage`."""
         super().__init__(block, precision, kernels, points)
-        self.force_kernel = patch_kernels.force_kernel(precision, block.law, block.viscous)
+        self.force_kernel = patch_kernels.force_kernel(precision, block.law, block.joining)
         self.maker = patch_kernels.element
-        own = self.maker(precision, block.law, block.viscous)
+        own = self.maker(precision, block.law, block.joining)
         self.lanes = own.lanes if own.flow else 0
         mixed = precision == "mixed"
         ends, size = (*block.ends, *block.part_ends), patch_size(block.conn.shape[1], wp.get_device().sm_count)

@@ -16,6 +16,7 @@ from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.kernels.elements.viscosity import DILATATION, LINEAR, QUADRATIC, TAKEN, UNKNOWN, VISCOUS_ROWS
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.simd import vectorised
+from warp_mca.kernels.loads import thermal
 from warp_mca.kernels.materials.laws import ROWS, law_functions, row_count
 from warp_mca.physics.elements.state import ElementState
 from warp_mca.step.threads import ELEMENTS, Split, whole
@@ -49,7 +50,7 @@ class ElementStage:
     """Device side of one block of elements.
 
     Attributes:
-        block: the host side.
+        block: the host side. precision: as in `warp_mca.run`.
         index: of the block in the model; its state is `State.elements[index]`.
         conn, material: as in `Block`.
         dt: time step of level 0 [s], for viscosity and laws that depend on rates; 0, as it is at first, asks for the
@@ -75,7 +76,7 @@ class ElementStage:
                 what follows the history of the points, if anything does, and by `lags` whether vectors lag behind.
             points: integration points that keep a history.
         """
-        self.block, self.corners, self.index = block, block.conn.shape[0], 0
+        self.block, self.corners, self.index, self.precision = block, block.conn.shape[0], 0, precision
         self.conn = wp.array(block.conn, dtype=wp.int32)
         self.material = wp.array(block.material, dtype=wp.int32)
         self.count = block.conn.shape[1]
@@ -88,9 +89,9 @@ class ElementStage:
         self.lags = hasattr(kernels, "lags") and kernels.lags(self.law, block.finite)
         self.real = scalars(precision).real
         self.no_nodes = [wp.zeros((0, 0), dtype=wp.int32), wp.zeros(0, dtype=self.real)]
-        kind, viscous = (precision, block.law, block.finite), [True] * block.viscous
+        kind, viscous = (precision, block.law, block.finite), [block.joining] if block.joining else []
         self.force_kernel = vectorised(kernels.force_kernel(*kind, *viscous), large=block.finite or points > 1)
-        self.energy_kernel = vectorised(kernels.energy_kernel(*kind), large=block.finite)
+        self.energy_kernel = vectorised(kernels.energy_kernel(*kind, *[True] * block.heated), large=block.finite)
         self.stress_kernel = vectorised(kernels.stress_kernel(*kind), large=block.finite)
 
     def kernels(self) -> list[Any]:
@@ -107,7 +108,8 @@ class ElementStage:
 
     def new_state(self) -> ElementState:
         """State of elements that have never flowed, on the current device."""
-        extreme = np.zeros((VISCOUS_ROWS if self.block.viscous else 3 if self.lags else 2, self.count))
+        rows = VISCOUS_ROWS + self.block.heated if self.block.viscous else 3 if self.lags else 2
+        extreme = np.zeros((rows, self.count))
         if self.block.viscosity is not None:
             extreme[DILATATION], extreme[[LINEAR, QUADRATIC]] = UNKNOWN, self.block.viscosity
         return ElementState(
@@ -218,6 +220,9 @@ class ElementStage:
         inputs = [work.X, self.conn, self.material, work.law, own.yielded, own.history, u, element, first]
         inputs += self.nodal(slice(0, self.count))
         wp.launch(self.stress_kernel, len(element), inputs=inputs, outputs=[stress], block_dim=BLOCK_DIM)
+        if self.block.heated:
+            kernel = thermal.stress_kernel(self.precision, self.block.finite)
+            wp.launch(kernel, len(element), inputs=[element, own.extreme, first, self.corners], outputs=[stress])
 
     def max_plastic_strain(self, state: State, part: slice) -> float:
         """Greatest equivalent plastic strain of any point of a range of elements [-]."""

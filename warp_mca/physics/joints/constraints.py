@@ -66,7 +66,7 @@ def constraints(parts: Assembly, V: Array) -> dict[str, NDArray]:
             what = f"axis {item.axis} of some of these nodes of body {item.body} is bound twice"
             raise bad_value("Prescribed.nodes", item.nodes, f"{what}, by another Prescribed or Fixed; bind it once")
         bound[nodes, k] = True
-        drive(nodes, k, item.times, item.velocities)
+        drive(nodes, k, *item.velocity_table)
 
     def join(items: list[NDArray]) -> Index:
         return np.concatenate(items).astype(np.int32) if items else np.zeros(0, np.int32)

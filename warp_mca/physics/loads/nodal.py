@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,9 @@ from warp_mca.base.joining import SCENE, joinable, of
 from warp_mca.model.assembly import Assembly
 from warp_mca.scene.loads import LOADS, Load
 
+if TYPE_CHECKING:
+    from warp_mca.model.model import Model
+
 
 @joinable
 @dataclass(frozen=True, kw_only=True)
@@ -22,11 +26,17 @@ class LoadedNodes:
 
     Attributes:
         node: on which it acts, shape (count,), int32.
+        on_nodes: whether it acts on any at all.
         scene: number of the scene in a batch.
     """
 
     node: NDArray[np.int32] = field(metadata=of("nodes"))
     scene: int = field(default=0, metadata=SCENE)
+    on_nodes: ClassVar[bool] = True
+
+    def impulse(self, duration: float) -> float:
+        """Impulse that it gives to a free body until then at most [N s]; 0 where nothing is known of it."""
+        return 0.0
 
     def eigenvalues(self, mass: NDArray[np.float64]) -> NDArray[np.float64]:
         """What it adds at each of its nodes to the eigenvalue that bounds the stable step [1/s^2], shape (count,).
@@ -66,10 +76,25 @@ def _arrays(load: Load, parts: Assembly, start: float, added: NDArray[np.float64
     item = load.build(parts, start)
     if not isinstance(item, LoadedNodes):
         raise TypeError(f"build() gives a {type(item).__name__}, not a LoadedNodes")
-    if not (np.isin(item.node, np.arange(len(added))).all() and len(item.node)):
+    if not (np.isin(item.node, np.arange(len(added))).all() and (len(item.node) or not item.on_nodes)):
         raise IndexError(f"LoadedNodes.node names no node, or others than 0 to {len(added) - 1}")
     np.add.at(added, item.node, item.eigenvalues(parts.mass))
     return item
+
+
+def load_speed(model: Model, duration: float) -> float:
+    """Speed that loads give to a body that nothing holds until then at most [m/s]: contact is searched for by it."""
+    starts = np.array(sorted(model.node_start.values()))
+    ends = np.append(starts[1:], model.node_count)
+    held = np.flatnonzero(model.fixed_axes)
+    second = model.joint_second[model.joint_second >= 0]
+    bound = np.concatenate([held, model.joint_first, second, model.prescribed_node, model.ties.slave])
+    impulse = np.zeros(len(starts))
+    for item in (item for items in model.loads.values() for item in items if len(item.node)):
+        impulse[np.searchsorted(starts, item.node[0], side="right") - 1] += item.impulse(duration)
+    impulse[np.searchsorted(starts, bound, side="right") - 1] = 0.0
+    mass = np.array([model.mass[first:end].sum() for first, end in zip(starts, ends, strict=True)])
+    return float((impulse / np.where(impulse > 0.0, mass, 1.0)).max())
 
 
 def check_batch(scenes: Sequence[Mapping[str, object]]) -> None:

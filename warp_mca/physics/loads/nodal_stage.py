@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 from warp_mca.base.joining import offsets
 from warp_mca.kernels.records.entries import sum_entries
@@ -34,14 +35,19 @@ class NodalLoad(Actor):
         self.solver, self.name, self.work = solver, name, solver.work
         self.items: Sequence[Any] = solver.model.loads[name]
         self.column = added_columns(solver.model)[name].first
-        counts = np.zeros(solver.layout.count, dtype=np.int64)
-        np.add.at(counts, [item.scene for item in self.items], [self.entries(item) for item in self.items])
+        counts = self.counts()
         self.count, self.most = int(counts.sum()), int(counts.max())
         self.first = wp.array(offsets(counts.tolist()), dtype=wp.int32)
 
     def entries(self, item: Any) -> int:
         """How many numbers hold the energies of a load."""
         return len(item.node)
+
+    def counts(self) -> NDArray[np.int32]:
+        """How many numbers hold the energies of the loads of each scene, shape (scene_count,), int32."""
+        counts = np.zeros(self.solver.layout.count, dtype=np.int32)
+        np.add.at(counts, [item.scene for item in self.items], [self.entries(item) for item in self.items])
+        return counts
 
     def push(self, step: Step, start: bool = False) -> None:
         """Add forces [N] at u(n), v(n-1/2) to `work.nodal_force`, and count energies up to t(n).

@@ -1,0 +1,1 @@
+"""Owns the kernels of loads on nodes."""
