@@ -52,6 +52,7 @@ SOUND: dict[type, Any] = {
     mca.Penalty: mca.Penalty(),
     mca.DampedPenalty: mca.DampedPenalty(time=1e-6, speed=0.1),
     mca.Bond: mca.Bond(normal=1e6, shear=1e6, gap=0.5),
+    mca.Damping: mca.Damping(body="low", mass=1.0, loss_factor=0.1, band=(10.0, 20.0)),
     mca.DecayingFriction: mca.DecayingFriction(kinetic=0.2, decay=2.0),
     mca.ShearCap: mca.ShearCap(tau_max=1e8),
     mca.Revolute: mca.Revolute(name="O", body="up", at=(0.0, 0.0, 0.0)),
@@ -191,6 +192,7 @@ def scene_with(item: Any) -> mca.Scene:
                 mca.Fixed: "fixed",
                 mca.Prescribed: "prescribed",
                 mca.Absorbing: "absorbing",
+                mca.Damping: "loads",
                 mca.Tie: "ties",
                 mca.Settle: "phases",
             }[type(item)]

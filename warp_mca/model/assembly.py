@@ -193,9 +193,9 @@ class Assembly:
                     first += len(index)
         return tuple(blocks), np.concatenate(order)
 
-    def stable(self, added: Array) -> StableStep:
-        """Stable step with what contact springs add to the eigenvalue at each node [1/s^2]."""
-        return min(map(stable_step, self.computed(added)), key=lambda step: step.dt)
+    def stable(self, added: Array, body: str | None = None) -> StableStep:
+        """Stable step with what contact springs add to the eigenvalue at each node [1/s^2], of all or of one body."""
+        return min(map(stable_step, self.computed(added, body)), key=lambda step: step.dt)
 
     def element_steps(self, added: Array, *, coarse: bool = False) -> Array:
         """Stable step of each element by itself [s], as `stable_step.element_steps`, in the order of the meshes."""
@@ -204,11 +204,14 @@ class Assembly:
             steps[elements.index] = element_steps(elements, coarse=coarse)
         return steps
 
-    def computed(self, added: Array) -> Iterator[Elements]:
-        """Elements that are computed, by formulation, with masses less by `relief`."""
+    def computed(self, added: Array, body: str | None = None) -> Iterator[Elements]:
+        """Elements that are computed, by formulation, with masses less by `relief`; all, or those of one body."""
         added = added if self.relief is None else added * self.relief
         for part, own in zip(self.cells, self.element_mass, strict=True):
             kept = ~self.rigid[part.index]
+            if body is not None:
+                first = self.element_start[body]
+                kept &= (part.index >= first) & (part.index < first + self.meshes[body].cell_count)
             if kept.any():
                 some = slice(None) if kept.all() else kept  # without a copy
                 conn, index, mass = part.conn[some], part.index[some], own[some]

@@ -9,6 +9,7 @@ from warp_mca.scene.bodies import Body, Vec3
 from warp_mca.scene.bonds import Bond
 from warp_mca.scene.contact_laws import DampedPenalty, Penalty
 from warp_mca.scene.contacts import OVERLAP_CHOICES, Contact, ContactAll, RigidPlane, Surface
+from warp_mca.scene.damping import Damping
 from warp_mca.scene.drives import Fixed, Prescribed
 from warp_mca.scene.friction_laws import DecayingFriction, ShearCap
 from warp_mca.scene.joints import Prismatic, Revolute, Spherical, Weld
@@ -27,6 +28,7 @@ __all__ = [
     "Contact",
     "ContactAll",
     "DampedPenalty",
+    "Damping",
     "DecayingFriction",
     "Fixed",
     "ImpactPhase",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any, ClassVar
 
 from warp_mca.base import validate
@@ -17,15 +18,24 @@ class Load:
         body: on whose nodes it acts.
         energies: entries of the energy ledger to which a kind adds, in the order of `NodalLoad.energies`.
         refuses: what a kind cannot be combined with, "multi_rate" or "run_batch", and the remedy, for the error.
+        module: whose `build` and `Stage` the methods `build` and `stage` stand for, where a kind does not write these.
+        inner: whether it acts between points of one body alone, so that bodies that move as rigid ones do not feel it.
     """
 
     body: str
     energies: ClassVar[tuple[str, ...]] = ("external_work",)
     refuses: ClassVar[Mapping[str, str]] = {}
+    module: ClassVar[str] = ""
+    inner: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         validate.plain(self)
         validate.texts(type(self).__name__, body=self.body)
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether it is the same at all times, so that it may act in phases before the impact, too."""
+        return False
 
     def bodies(self) -> dict[str, str]:
         """Bodies that it names, by field."""
@@ -43,12 +53,16 @@ class Load:
         Raises:
             RequestError: it cannot act so.
         """
-        raise NotImplementedError("its class has no build()")
+        if not self.module:
+            raise NotImplementedError("its class has no build()")
+        return import_module(self.module).build(self, assembly)
 
     @classmethod
     def stage(cls) -> type[Any]:
         """The class of its device side, made of `physics.loads.nodal_stage.NodalLoad`."""
-        raise NotImplementedError("its class has no stage()")
+        if not cls.module:
+            raise NotImplementedError("its class has no stage()")
+        return import_module(cls.module).Stage
 
 
 LOADS: dict[str, type[Load]] = {}

@@ -169,7 +169,7 @@ class Scene:
             raise bad_value("ImpactPhase.mass_scaling", self.impact.mass_scaling, remedy)
         for present, why in (
             (self.absorbing, "a cut body with absorbing sides does not move between impacts as the large one"),
-            (self.loads, "loads act in an impact alone, not in the swings between"),
+            ([a for a in self.loads if not a.inner], "loads act in an impact alone, not in the swings between"),
             (any(item.bond for item in self.listed), "bonds act in an impact alone, not in the swings between"),
             (self.prescribed, "nodes with a Prescribed velocity cannot follow it between impacts"),
         ):
@@ -187,8 +187,10 @@ class Scene:
             if type(phase) not in PHASES.values():
                 remedy = f"give {' or '.join(PHASES)}; register other classes by warp_mca.register"
                 raise bad_value(f"Scene.phases[{k}]", validate.brief(phase), remedy)
-        for name in ("rigid", "prescribed", "loads") if self.phases else ():
-            if getattr(self, name):
+        timed = {"rigid": self.rigid, "prescribed": self.prescribed}
+        timed |= {"loads": [load for load in self.loads if not load.is_constant]}
+        for name, given in timed.items() if self.phases else ():
+            if given:
                 raise bad_value(f"Scene.{name}", "given", "its times count from the impact; leave it or phases out")
 
     @property

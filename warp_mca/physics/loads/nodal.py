@@ -35,6 +35,13 @@ class LoadedNodes:
         """
         return np.zeros(len(self.node))
 
+    def decays(self, mass: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Rate of decay of its dashpots at each of its nodes, as part of M^-1 C [1/s], shape (count,).
+
+        They read the velocity of half a step before. `mass` as above.
+        """
+        return np.zeros(len(self.node))
+
 
 def loaded_nodes(
     parts: Assembly, start: float, added: NDArray[np.float64], several_rates: bool

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import warp as wp
@@ -27,7 +27,11 @@ class NodalLoad(Actor):
         items: the loads, those of each scene in turn.
         column: of a record, the first that they add.
         count: numbers that hold the energies of all.
+        place, stream: of the stage of its forces: by default in the stream of contact, which adds to the same ones.
     """
+
+    place: ClassVar[str] = "forces"
+    stream: ClassVar[str] = BEYOND
 
     def __init__(self, solver: Solver, name: str) -> None:
         """Allocate on the current device."""
@@ -63,9 +67,9 @@ class NodalLoad(Actor):
         self.push(Step(state), start=True)
 
     def stages(self, when: When) -> Iterable[Stage]:
-        """Forces, in the stream of contact, which adds to the same ones; energies of each scene."""
+        """Forces; energies of each scene."""
         if when.common:
-            yield Stage("forces", f"loads: {self.name}", self.push, BEYOND)
+            yield Stage(self.place, f"loads: {self.name}", self.push, self.stream)
         yield Stage("works", f"energies: {self.name}", self._sum, only_records=True)
 
     def _sum(self, step: Step) -> None:
