@@ -67,6 +67,17 @@ SOUND: dict[type, Any] = {
     mca.Settle: mca.Settle(duration=1e-3),
     mca.ImpactPhase: mca.ImpactPhase(duration=1e-7, output_interval=1e-7),
     mca.BaseMotion: mca.BaseMotion(times=(0.0, 1.0), vx=(0.0, 1.0), vy=(0.5, 0.0)),
+    mca.Spring: mca.Spring(
+        name="s",
+        body="low",
+        at=(0.0, 0.0, 0.0),
+        other_at=(0.0, -0.1, 0.0),
+        stiffness=1.0,
+        speeds=(0.0, 1.0),
+        damping_forces=(0.0, 1.0),
+        length=0.1,
+        preload=1.0,
+    ),
     mca.Slide: mca.Slide(direction=(1.0, 0.0, 0.0), carriage_mass=0.1, velocity=0.1),
     mca.JointTorque: mca.JointTorque(joint="O", times=(0.0, 1.0), torques=(0.0, 1.0)),
 }
@@ -193,6 +204,7 @@ def scene_with(item: Any) -> mca.Scene:
                 mca.Prescribed: "prescribed",
                 mca.Absorbing: "absorbing",
                 mca.Damping: "loads",
+                mca.Spring: "loads",
                 mca.Tie: "ties",
                 mca.Settle: "phases",
             }[type(item)]

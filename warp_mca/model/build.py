@@ -118,7 +118,7 @@ def build_model(
     absorbing = absorbing_nodes(parts, velocity, held, pairs)
     added[absorbing.node] += absorbing.eigenvalues(parts.mass)
     loads = loaded_nodes(parts, start, added, grouping is not None)
-    rigid = rigid_bodies(parts, pairs, joints, couplings, passes, velocity)
+    rigid = rigid_bodies(parts, pairs, joints, couplings, passes, loads, velocity)
     check_ties(ties, held, [nodes_of(pairs), absorbing.node, *(body.nodes for body in rigid.bodies)])
     added, parts.relief = ties.shared(added, parts.mass), ties.relief(parts.mass)
     found: dict[str, Any] = {**_bodies(parts, watched), **held, **pairs}

@@ -107,9 +107,13 @@ def locate_sensors(scene: Scene, meshes: Mapping[str, Mesh]) -> Sensors:
     return Sensors(tuple(spots), tuple(_cut(section, meshes[section.body]) for section in scene.sections))
 
 
-def _around(probe: Probe, mesh: Mesh) -> Spot:
-    """The corners of the cell around a point, with its shape functions there as weights."""
-    at = np.array([probe.at], dtype=np.float64)
+def around_point(field: str, body: str, place: Array, mesh: Mesh) -> tuple[Index, Array]:
+    """The corners of the cell around a point of a body [m], shape (3,), with its shape functions there as weights.
+
+    Raises:
+        RequestError: the point, of the named field, lies outside the body.
+    """
+    at = place[None]
     found = []
     for name, cells in mesh.cells.items():
         if len(cells):
@@ -118,19 +122,26 @@ def _around(probe: Probe, mesh: Mesh) -> Spot:
             found.append(LOCATE[linear.name](at, mesh.points, corners, cell_boxes(mesh.points, corners)))
     corner, weight, apart, allowed = min(found, key=lambda cell: float(cell[2][0] - cell[3][0]))
     if apart[0] > allowed[0]:
-        remedy = f"this point lies {apart[0]:.3g} m outside the body {probe.body}; give one of it, in its own frame"
-        raise bad_value(f"{probe.title}.at", probe.at, remedy)
+        remedy = f"this point lies {apart[0]:.3g} m outside the body {body}; give one of it, in its own frame"
+        raise bad_value(field, tuple(place.tolist()), remedy)
     kept = weight[0] != 0.0
-    return Spot(probe.body, corner[0][kept].astype(np.int32), weight[0][kept])
+    return corner[0][kept].astype(np.int32), weight[0][kept]
+
+
+def weighted_set(node: Index, mass: Array) -> tuple[Index, Array]:
+    """The nodes of a set, weighted with their part of the `mass` of a body's nodes; slaves of ties have none."""
+    weight = mass[node] if mass[node].any() else np.ones(len(node))
+    return node.astype(np.int32), weight / weight.sum()
+
+
+def _around(probe: Probe, mesh: Mesh) -> Spot:
+    place = np.array(probe.at, dtype=np.float64)
+    return Spot(probe.body, *around_point(f"{probe.title}.at", probe.body, place, mesh))
 
 
 def _of_set(probe: Probe, mesh: Mesh, masses: Mapping[str, Array]) -> Spot:
-    """The nodes of a set, weighted with their masses; slaves of ties have none."""
     assert probe.nodes is not None
-    node = mesh.nodes(probe.nodes)
-    mass = masses[probe.body][node]
-    weight = mass if mass.any() else np.ones(len(node))
-    return Spot(probe.body, node.astype(np.int32), weight / weight.sum())
+    return Spot(probe.body, *weighted_set(mesh.nodes(probe.nodes), masses[probe.body]))
 
 
 def _cut(section: Section, mesh: Mesh) -> Cut:

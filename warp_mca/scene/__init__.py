@@ -17,6 +17,7 @@ from warp_mca.scene.phases import BaseMotion, ImpactPhase, JointTorque, RigidPha
 from warp_mca.scene.probes import Line, Path, Point
 from warp_mca.scene.scene import Scene
 from warp_mca.scene.sensors import Probe, Section
+from warp_mca.scene.springs import Spring
 from warp_mca.scene.tied_surfaces import Tie
 
 __all__ = [
@@ -49,6 +50,7 @@ __all__ = [
     "Spherical",
     "Settle",
     "Slide",
+    "Spring",
     "Surface",
     "Tie",
     "Tip",

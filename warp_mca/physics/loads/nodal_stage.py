@@ -9,7 +9,7 @@ import numpy as np
 import warp as wp
 
 from warp_mca.base.joining import offsets
-from warp_mca.kernels.records.entries import sum_entries
+from warp_mca.kernels.records.entries import list_entries, sum_entries
 from warp_mca.model.columns import added_columns
 from warp_mca.physics.actor import Actor, When
 from warp_mca.step.stage import BEYOND, Stage, Step
@@ -58,8 +58,12 @@ class NodalLoad(Actor):
         """Of each of `Load.energies` at t(n) [J], shape (count,), float64: `entries` of each load in turn."""
         raise NotImplementedError
 
+    def readings_of(self, state: State) -> Sequence[wp.array]:
+        """Of each of `Load.readings` at t(n), an entry for each load, shape (len(items),), float64."""
+        return []
+
     def record_kernels(self) -> list[Any]:
-        """That of the sums."""
+        """That of the sums, and of what is read off each load."""
         return [sum_entries]
 
     def start_forces(self, state: State) -> None:
@@ -75,3 +79,8 @@ class NodalLoad(Actor):
     def _sum(self, step: Step) -> None:
         for k, entry in enumerate(self.energies_of(step.state)):
             self.solver.records.sum_runs(sum_entries, self.most, [self.column + k, self.first, entry])
+        column = self.column + len(self.energies_of(step.state))
+        for entry in self.readings_of(step.state):
+            inputs = [self.work.row, column, self.first, entry]
+            wp.launch(list_entries, len(entry), inputs=inputs, outputs=[self.work.partial])
+            column += self.most
