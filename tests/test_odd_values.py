@@ -60,6 +60,7 @@ SOUND: dict[type, Any] = {
     mca.Spherical: mca.Spherical(name="S", body="up", at=(0.0, 0.0, 0.0)),
     mca.Prismatic: mca.Prismatic(name="P", body="up", nodes="ymax", axis=(1.0, 0.0, 0.0)),
     mca.Fixed: mca.Fixed(body="low", nodes="ymin"),
+    mca.PointMass: mca.PointMass(body="low", mass=1e-3, at=(0.0, 0.0, 0.0)),
     mca.Prescribed: mca.Prescribed(body="low", nodes="ymin", axis="x", times=(0.0, 1.0), velocities=(0.0, 1.0)),
     mca.Absorbing: mca.Absorbing(body="low", nodes="ymin", centre=(0.0, 0.0, 0.0)),
     mca.Tip: TIP,
@@ -205,6 +206,7 @@ def scene_with(item: Any) -> mca.Scene:
                 mca.Absorbing: "absorbing",
                 mca.Damping: "loads",
                 mca.Spring: "loads",
+                mca.PointMass: "masses",
                 mca.Tie: "ties",
                 mca.Settle: "phases",
             }[type(item)]

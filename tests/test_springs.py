@@ -178,9 +178,39 @@ def test_the_stable_step_counts_springs():
     assert run.stopped == [None]
 
 
+@pytest.mark.parametrize("body", [RIGID, BLOCK], ids=("rigid", "flexible"))
+def test_a_point_mass_slows_the_swing_and_has_weight(body: mca.Body):
+    """w^2 = k / (m + m_p), at a point and on a set; hung by gravity, it shifts the rest by (m + m_p) g / k."""
+    for where in ({"at": (0.001, 0.0, 0.0)}, {"nodes": "boundary"}):
+        mass = mca.PointMass(body="a", mass=3.0 * M, **where)
+        periods = 1.0 if body.rigid else 0.05
+        spring = replace(SPRING, at=None, nodes="boundary")
+        scene = hung(spring, bodies=(body,), masses=(mass,), gravity=(-9.81, 0.0, 0.0), periods=periods)
+        result = result_of(finished(scene, precision="float64"))
+        w, shift = 0.5 * W, 4.0 * M * 9.81 / K
+        x = shift * (1.0 - np.cos(w * result.time))
+        tolerance = 1e-3 if body.rigid else 5e-3  # the mass set lags behind the mean of the surface
+        assert np.abs(result["spring_s_m"] - x).max() < tolerance * x.max()
+
+
+def test_point_masses_that_do_not_fit_are_refused():
+    for given, message in (
+        ({"mass": 0.0, "at": CENTRE}, r"PointMass of a.mass = 0.0: give a finite number above 0"),
+        ({"mass": 1.0}, r"PointMass of a.at = None: give either a point"),
+        ({"mass": 1.0, "at": CENTRE, "nodes": "xmin"}, r"PointMass of a.at = .*: give either a point"),
+    ):
+        with pytest.raises(mca.RequestError, match=message):
+            mca.PointMass(body="a", **given)
+    with pytest.raises(mca.RequestError, match=r"PointMass of a.at = .*: this point lies .* outside the body a"):
+        mca.run(hung(SPRING, masses=(mca.PointMass(body="a", mass=1.0, at=(1.0, 0.0, 0.0)),)))
+    with pytest.raises(mca.RequestError, match=r"PointMass.body = 'c': the scene's bodies are a"):
+        hung(SPRING, masses=(mca.PointMass(body="c", mass=1.0, at=CENTRE),))
+
+
 def test_a_model_file_and_a_checkpoint_go_on_to_the_same_bits(tmp_path: Path):
     spring = replace(SPRING, at=None, nodes="xmax", damping=0.1, **TABLE, stiffness=0.0)
-    goes_on(hung(spring, bodies=(moving(BLOCK, 1.0),), periods=0.01), tmp_path)
+    mass = mca.PointMass(body="a", mass=M, nodes="xmax")
+    goes_on(hung(spring, bodies=(moving(BLOCK, 1.0),), masses=(mass,), periods=0.01), tmp_path)
 
 
 def test_a_batch_gives_each_scene_its_springs():

@@ -18,7 +18,15 @@ from warp_mca.model.viscosity import viscosities
 from warp_mca.physics.contact.stiffness import Inertia
 from warp_mca.physics.contact.surfaces import Faces, make_faces
 from warp_mca.physics.elements import Element
-from warp_mca.physics.elements.cells import Cells, body_cells, body_materials, densities, element_masses, sum_to_nodes
+from warp_mca.physics.elements.cells import (
+    Cells,
+    body_cells,
+    body_materials,
+    densities,
+    element_masses,
+    point_masses,
+    sum_to_nodes,
+)
 from warp_mca.physics.elements.patches import compact_order
 from warp_mca.scene import Point, Scene, Surface
 from warp_mca.scene.materials import Material
@@ -139,6 +147,9 @@ class Assembly:
             self.face_depth[part.index], self.face_height[part.index] = kind.face_depth, kind.face_height
             self.element_mass.append(mass)
             self.mass += sum_to_nodes(part.conn, mass, nodes)
+        for name in {item.body for item in scene.masses}:
+            own = self.all_nodes(name)
+            self.mass[own] += point_masses(scene, meshes[name], name, self.mass[own])
 
     def _merged_cells(self) -> list[Cells]:
         found: dict[tuple[str, bool], list[Cells]] = {}

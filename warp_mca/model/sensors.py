@@ -12,10 +12,8 @@ from numpy.typing import NDArray
 from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
 from warp_mca.base.joining import offsets
-from warp_mca.geometry.boxes import cell_boxes
-from warp_mca.geometry.cell_types import linear_type
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.geometry.point_location import LOCATE
+from warp_mca.geometry.point_location import around_point, weighted_set
 from warp_mca.physics.elements.cells import nodal_masses
 
 if TYPE_CHECKING:
@@ -105,33 +103,6 @@ def locate_sensors(scene: Scene, meshes: Mapping[str, Mesh]) -> Sensors:
         for probe in scene.probes
     )
     return Sensors(tuple(spots), tuple(_cut(section, meshes[section.body]) for section in scene.sections))
-
-
-def around_point(field: str, body: str, place: Array, mesh: Mesh) -> tuple[Index, Array]:
-    """The corners of the cell around a point of a body [m], shape (3,), with its shape functions there as weights.
-
-    Raises:
-        RequestError: the point, of the named field, lies outside the body.
-    """
-    at = place[None]
-    found = []
-    for name, cells in mesh.cells.items():
-        if len(cells):
-            linear = linear_type(name)
-            corners = cells[:, : linear.corners]
-            found.append(LOCATE[linear.name](at, mesh.points, corners, cell_boxes(mesh.points, corners)))
-    corner, weight, apart, allowed = min(found, key=lambda cell: float(cell[2][0] - cell[3][0]))
-    if apart[0] > allowed[0]:
-        remedy = f"this point lies {apart[0]:.3g} m outside the body {body}; give one of it, in its own frame"
-        raise bad_value(field, tuple(place.tolist()), remedy)
-    kept = weight[0] != 0.0
-    return corner[0][kept].astype(np.int32), weight[0][kept]
-
-
-def weighted_set(node: Index, mass: Array) -> tuple[Index, Array]:
-    """The nodes of a set, weighted with their part of the `mass` of a body's nodes; slaves of ties have none."""
-    weight = mass[node] if mass[node].any() else np.ones(len(node))
-    return node.astype(np.int32), weight / weight.sum()
 
 
 def _around(probe: Probe, mesh: Mesh) -> Spot:

@@ -13,6 +13,7 @@ from warp_mca.scene.damping import Damping
 from warp_mca.scene.drives import Fixed, Prescribed
 from warp_mca.scene.friction_laws import DecayingFriction, ShearCap
 from warp_mca.scene.joints import Prismatic, Revolute, Spherical, Weld
+from warp_mca.scene.masses import PointMass
 from warp_mca.scene.phases import BaseMotion, ImpactPhase, JointTorque, RigidPhase, Settle, Slide, Tip
 from warp_mca.scene.probes import Line, Path, Point
 from warp_mca.scene.scene import Scene
@@ -38,6 +39,7 @@ __all__ = [
     "Path",
     "Penalty",
     "Point",
+    "PointMass",
     "Prescribed",
     "Prismatic",
     "Probe",

@@ -9,8 +9,8 @@ import numpy as np
 from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
 from warp_mca.base.joining import AS_IS, joinable
+from warp_mca.geometry.point_location import around_point, weighted_set
 from warp_mca.model.assembly import Assembly
-from warp_mca.model.sensors import around_point, weighted_set
 from warp_mca.physics.loads.nodal import LoadedNodes
 from warp_mca.physics.loads.springs_stage import SpringsStage as Stage
 from warp_mca.scene.springs import Spring
