@@ -9,11 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+import test_cycle
 from impacts import begun, finished, result_of
 from outside import goes_on
 
 import warp_mca as mca
+from warp_mca.phases.cycle import Cycle
 from warp_mca.phases.impact import Impact
+from warp_mca.phases.prepare import Request
+from warp_mca.phases.settings import Settings
 
 L, CELLS = 0.1, 10
 ALUMINIUM = mca.Elastic(E=70e9, nu=0.0, rho=2700.0)
@@ -136,8 +140,8 @@ def prepared_step(scene: mca.Scene) -> float:
 @pytest.mark.parametrize("damping", ALL, ids=("mass", "stiffness", "loss"))
 def test_falling_and_spinning_go_on_as_without_damping(damping: mca.Damping):
     """Free fall keeps g t, a spin its angular momentum and, once it has stretched, its energy."""
-    scene = ringing(damping, gravity=(0.0, -1000.0, 0.0))
-    run = begun(scene, precision="float64")
+    falling = ringing(damping, gravity=(0.0, -1000.0, 0.0))
+    run = begun(falling, precision="float64")
     model = run.solver.model
     centre = model.mass @ model.X / model.mass.sum()
     v = np.array([3.0, 0.0, 0.0]) + np.cross([0.0, 300.0, 1000.0], model.X - centre)
@@ -241,3 +245,16 @@ def test_values_that_damp_nothing_are_refused(given: dict, message: str):
 def test_what_damping_does_not_go_with_is_refused(change: dict, damping: mca.Damping, settings: dict, message: str):
     with pytest.raises(mca.RequestError, match=message):
         mca.run(ringing(damping, **change), **settings)
+
+
+def test_swings_and_impacts_in_turn_keep_what_damping_took():
+    """Rigid swings take nothing; the columns go on from one impact to the next, and the ledger closes."""
+    swinging = test_cycle.scene("single_link", t_end=0.35)
+    damped = replace(swinging, loads=(mca.Damping(body="OA", loss_factor=0.05, band=(500.0, 5e4)),))
+    result = Cycle(damped, None, Request(span=1.5e-3, settings=Settings("cpu", "mixed", 1))).run()
+    kinds, energy = [phase["kind"] for phase in result.summary["phases"]], result.summary["energy"]
+    assert kinds == ["rigid", "impact", "rigid"]
+    assert energy["damping"] == result["E_damping"][-1] == result["E_damping"][-200] > 0.01
+    assert abs(energy["error"]) < 2e-3 * energy["damping"]
+    with pytest.raises(mca.RequestError, match="loads act in an impact alone"):
+        replace(damped, loads=(mca.Spring(name="s", body="OA", nodes="tip", other_at=(0, 0, 0), stiffness=1.0),))
