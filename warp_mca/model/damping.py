@@ -44,9 +44,10 @@ def with_damping(stable: StableStep, parts: Assembly, loads: Loads, added: Array
             continue
         own = parts.stable(added, item.body)
         square = (2.0 / own.dt) ** 2
-        stiff = replace(own, dt=own.dt / np.sqrt(1.0 + item.gain.sum()))
+        stiff = replace(own, dt=own.dt / float(np.sqrt(1.0 + item.gain.sum())))
         found.append(with_dashpots(stiff, decay + item.stiffness * square))
-    return min(found, key=lambda step: step.dt)
+    least = min(found, key=lambda step: step.dt)
+    return replace(least, damped=stable.dt / least.dt)
 
 
 def _all(loads: Loads) -> Iterable[LoadedNodes]:

@@ -148,10 +148,11 @@ class HalfSteps:
             parameters.assign(values)
         kept, state = scene_run.ledger.kept, self.state
         self.look()
-        at_rest = self._kinetic(*(velocities[0] for velocities in self.now), ~self.waiting[0])
+        (before, *_), (after, *_) = self.now
+        at_rest = self._kinetic(before, after, ~self.waiting[0])
         self._give(self.initial, False)
-        before = np.array(state.v.numpy(), dtype=np.float64)
-        given = self._kinetic(before, 2.0 * self.initial[0] - before, self.waiting[0])
+        v = np.array(state.v.numpy(), dtype=np.float64)
+        given = self._kinetic(v, 2.0 * self.initial[0] - v, self.waiting[0])
         kept.initial_energy += given
         kept.initial_kinetic = at_rest + given
         state.normal_force.zero_()
