@@ -187,6 +187,7 @@ def test_a_point_mass_slows_the_swing_and_has_weight(body: mca.Body):
         spring = replace(SPRING, at=None, nodes="boundary")
         scene = hung(spring, bodies=(body,), masses=(mass,), gravity=(-9.81, 0.0, 0.0), periods=periods)
         result = result_of(finished(scene, precision="float64"))
+        assert result.summary["bodies"]["a"]["mass"] == pytest.approx(4.0 * M, rel=1e-12)
         w, shift = 0.5 * W, 4.0 * M * 9.81 / K
         x = shift * (1.0 - np.cos(w * result.time))
         tolerance = 1e-3 if body.rigid else 5e-3  # the mass set lags behind the mean of the surface
