@@ -157,6 +157,7 @@ def pull_springs(
         for k in range(begin + lane, middle, wp.block_dim()):
             i = springs.node[k]
             nodal_force_out[i] = nodal_force_out[i] + springs.weight[k] * T * n
+        wait_for_block()  # points may share nodes
         for k in range(middle + lane, end, wp.block_dim()):
             i = springs.node[k]
             nodal_force_out[i] = nodal_force_out[i] - springs.weight[k] * T * n

@@ -114,14 +114,15 @@ def build(load: Spring, assembly: Assembly) -> SpringNodes:
 def _point(
     assembly: Assembly, load: Spring, key: str, body: str, at: tuple[float, ...] | None, nodes: str | None
 ) -> tuple[Index, Array]:
-    """Nodes of a point and their weights, which add up to 1."""
+    """Nodes of a point, each once, and their weights, which add up to 1."""
     mesh, first = assembly.meshes[body], assembly.node_start[body]
     if nodes is None:
         field = f"{load.title}.{'at' if key == 'body' else 'other_at'}"
         node, weight = around_point(field, body, np.array(at, dtype=np.float64), mesh)
     else:
         node, weight = weighted_set(mesh.nodes(nodes), assembly.mass[assembly.all_nodes(body)])
-    return node + first, weight
+    own, place = np.unique(node, return_inverse=True)  # corners of wedges coincide
+    return own + first, np.bincount(place, weight)
 
 
 def _lightness(assembly: Assembly, body: str, node: Index, weight: Array, n: Array) -> float:
