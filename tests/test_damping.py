@@ -258,3 +258,13 @@ def test_swings_and_impacts_in_turn_keep_what_damping_took():
     assert abs(energy["error"]) < 2e-3 * energy["damping"]
     with pytest.raises(mca.RequestError, match="loads act in an impact alone"):
         replace(damped, loads=(mca.Spring(name="s", body="OA", nodes="tip", other_at=(0, 0, 0), stiffness=1.0),))
+
+
+def test_moduli_rise_over_the_band_as_much_as_the_page_says():
+    """By eta at its lower end and (2 / pi) eta ln(f2 / f1) more at the upper one: Kramers and Kronig's relation."""
+    for loss, ratio in ((0.01, 10.0), (0.02, 100.0), (0.05, 10.0)):
+        share, times = mca.Damping(body="bar", loss_factor=loss, band=(100.0, 100.0 * ratio)).branches()
+        x = 2.0 * math.pi * np.array([100.0, 100.0 * ratio])[:, None] * times
+        low, high = (share * x * x / (1.0 + x * x)).sum(axis=1)
+        assert low == pytest.approx(loss, rel=0.3)
+        assert high - low == pytest.approx(2.0 / math.pi * loss * math.log(ratio), rel=0.25)

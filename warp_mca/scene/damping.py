@@ -30,9 +30,10 @@ class Damping(Load):
     the loss factor. K v is the rate at which the forces of the elements change, as seen by who turns with the body. So
     the stiffness part follows the tangent: it grows smaller where a body yields.
 
-    A loss factor adds generalised Maxwell branches to all moduli, which keep their values at rest (Emmerich and Korn,
-    Geophysics 52 (1987) 1252). Waves of high frequency are faster by half of `stiffening`. It hardly shortens the time
-    step, where stiffness divides it by beta w of the fastest vibration of a cell.
+    A loss factor adds generalised Maxwell branches to all moduli, which keep their values for slow loads (Emmerich and
+    Korn, Geophysics 52 (1987) 1252). At frequencies far above the band they are higher by the share `stiffening`. It
+    shortens the time step by the root of that, where stiffness divides it by beta w of the fastest vibration of a cell.
+    A free vibration decays faster than half of the loss factor says, by the share loss_factor / pi.
 
     Attributes:
         mass: alpha [1/s].
