@@ -4,12 +4,14 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from impacts import Displaced
+from impacts import Displaced, prepared
 from scipy.spatial.transform import Rotation
 
 import warp_mca as mca
 from warp_mca.base.errors import GuardError
 from warp_mca.model.build import build_model
+from warp_mca.phases.residual import Relaxation
+from warp_mca.phases.settings import Settings
 from warp_mca.physics.elements.cells import nodal_masses
 from warp_mca.rigid.equilibrium import equilibrium
 from warp_mca.step.solver import Solver
@@ -182,3 +184,18 @@ def test_a_search_that_fails_says_why(forces: Callable[[np.ndarray], np.ndarray]
     u = np.random.default_rng(0).normal(size=points.shape) * 1e-5
     with pytest.raises(GuardError, match=message):
         equilibrium(forces, u, points, np.ones(len(points)), elastic_energy=1e-6, name="bar")
+
+
+@pytest.mark.parametrize("held", [True, False])
+def test_a_body_that_nothing_has_strained_keeps_its_shape(held: bool):
+    """Displacements are rounded: no share of the elastic energy that they have then says when forces are small."""
+    body = mca.Body(name="bar", geometry=mca.Box(size=(0.1, 0.01, 0.01), divisions=(10, 2, 2)), material=metal(0.3))
+    fixed = (mca.Fixed(body="bar", nodes="xmin"),) if held else ()
+    scene = mca.Scene(name="flying", bodies=(body,), fixed=fixed, impact=mca.ImpactPhase(duration=1e-6))
+    relaxation = Relaxation(prepared(scene).model, Settings("cpu", "float64", 1))
+    X = relaxation.model.X
+    turn = Rotation.from_euler("z", 0.0 if held else 0.7).as_matrix()
+    u = X @ turn.T - X + (0.0 if held else 0.3)
+    u += 1e-17 * np.random.default_rng(0).standard_normal(u.shape) * (X[:, :1] > 0.0)
+    shape = relaxation.settle(u, relaxation.solver.new_state())
+    np.testing.assert_allclose(shape.u, u, atol=1e-14)

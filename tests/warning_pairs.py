@@ -334,6 +334,14 @@ def _(beyond: bool) -> list[str]:
     return told_of(meshes.sliver, alone(sliver() if beyond else cube(4)))
 
 
+@pair(meshes.costly_damping)
+def _(beyond: bool) -> list[str]:
+    scene = alone(cube(4))
+    step = prepared(scene).model.stable.dt  # sqrt(1 + xi^2) - xi = 2 / 3 where xi = beta / step is 5 / 12
+    damping = mca.Damping(body=scene.bodies[0].name, stiffness=5.0 / 12.0 * step * (1.001 if beyond else 0.999))
+    return told_of(meshes.costly_damping, replace(scene, loads=(damping,)))
+
+
 @pair(meshes.doubled_node)
 def _(beyond: bool) -> list[str]:
     return told_of(meshes.doubled_node, alone(joined_cubes((0.02 if beyond else 0.021, 0.0, 0.0))))

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from benchmarks.deliberate.catches import CATCHES
+from benchmarks.deliberate.damping_mutations import DAMPING_MUTATIONS
 from benchmarks.deliberate.element_mutations import ELEMENT_MUTATIONS
 from benchmarks.deliberate.load_mutations import LOAD_MUTATIONS
 from benchmarks.deliberate.mutation import Mutation
@@ -317,7 +318,7 @@ MUTATIONS: dict[str, Mutation] = {
     ),
 } | ELEMENT_MUTATIONS
 
-MUTATIONS |= RIGID_MUTATIONS | LOAD_MUTATIONS
+MUTATIONS |= RIGID_MUTATIONS | LOAD_MUTATIONS | DAMPING_MUTATIONS
 
 
 def notes() -> dict[str, str]:

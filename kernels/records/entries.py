@@ -1,4 +1,4 @@
-"""Owns sums of entries of an array, of each scene apart."""
+"""Owns sums of entries of an array, and entries one by one, of each scene apart."""
 
 import warp as wp
 
@@ -22,3 +22,19 @@ def sum_entries(
     found = wp.tile_sum(wp.tile(total))
     if lane == 0:
         partial_out[row[0], scene, column, k] = found[0]
+
+
+@wp.kernel(enable_backward=False)
+def list_entries(
+    row: wp.array(dtype=wp.int32),
+    column: int,
+    first: wp.array(dtype=wp.int32),
+    entry: wp.array(dtype=wp.float64),
+    partial_out: wp.array4d(dtype=wp.float64),
+):
+    """Each entry of a scene in a column of its own, from `column` on."""
+    i = wp.tid()
+    scene = int(0)
+    while i >= first[scene + 1]:
+        scene += 1
+    partial_out[row[0], scene, column + i - first[scene], 0] = entry[i]

@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.arrays import Array, Index
+from warp_mca.base.errors import bad_value
 from warp_mca.geometry import tetrahedron
-from warp_mca.geometry.boxes import Boxes
-from warp_mca.geometry.cell_types import HEXAHEDRON, MAX_CORNERS, TETRAHEDRON
+from warp_mca.geometry.boxes import Boxes, cell_boxes
+from warp_mca.geometry.cell_types import HEXAHEDRON, MAX_CORNERS, TETRAHEDRON, linear_type
 from warp_mca.geometry.hexahedron import shape_functions
+from warp_mca.geometry.mesh import Mesh
 
 CANDIDATES = 64  # candidate cells for each point: the centres of long thin cells are far away
 OUTSIDE = 0.05  # share of a cell's diagonal by which a point may lie outside: faces on curved surfaces are flat
@@ -100,3 +102,30 @@ LOCATE: dict[str, Callable[[Array, Array, Index, Boxes], Located]] = {
     HEXAHEDRON.name: in_hexahedra,
     TETRAHEDRON.name: in_tetrahedra,
 }  # by stored cell type
+
+
+def around_point(field: str, body: str, place: Array, mesh: Mesh) -> tuple[Index, Array]:
+    """The corners of the cell around a point of a body [m], shape (3,), with its shape functions there as weights.
+
+    Raises:
+        RequestError: the point, of the named field, lies outside the body.
+    """
+    at = place[None]
+    found = []
+    for name, cells in mesh.cells.items():
+        if len(cells):
+            linear = linear_type(name)
+            corners = cells[:, : linear.corners]
+            found.append(LOCATE[linear.name](at, mesh.points, corners, cell_boxes(mesh.points, corners)))
+    corner, weight, apart, allowed = min(found, key=lambda cell: float(cell[2][0] - cell[3][0]))
+    if apart[0] > allowed[0]:
+        remedy = f"this point lies {apart[0]:.3g} m outside the body {body}; give one of it, in its own frame"
+        raise bad_value(field, tuple(place.tolist()), remedy)
+    kept = weight[0] != 0.0
+    return corner[0][kept].astype(np.int32), weight[0][kept]
+
+
+def weighted_set(node: Index, mass: Array) -> tuple[Index, Array]:
+    """The nodes of a set, weighted with their part of the `mass` of a body's nodes; slaves of ties have none."""
+    weight = mass[node] if mass[node].any() else np.ones(len(node))
+    return node.astype(np.int32), weight / weight.sum()

@@ -19,7 +19,15 @@ from warp_mca.model.viscosity import thermal_strains, viscosities
 from warp_mca.physics.contact.stiffness import Inertia
 from warp_mca.physics.contact.surfaces import Faces, make_faces
 from warp_mca.physics.elements import Element
-from warp_mca.physics.elements.cells import Cells, body_cells, body_materials, densities, element_masses, sum_to_nodes
+from warp_mca.physics.elements.cells import (
+    Cells,
+    body_cells,
+    body_materials,
+    densities,
+    element_masses,
+    point_masses,
+    sum_to_nodes,
+)
 from warp_mca.physics.elements.patches import compact_order
 from warp_mca.scene import Point, Scene, Surface
 from warp_mca.scene.materials import Material
@@ -155,6 +163,9 @@ class Assembly:
             self.face_depth[part.index], self.face_height[part.index] = kind.face_depth, kind.face_height
             self.element_mass.append(mass)
             self.mass += sum_to_nodes(part.conn, mass, nodes)
+        for name in {item.body for item in scene.masses}:
+            own = self.all_nodes(name)
+            self.mass[own] += point_masses(scene, meshes[name], name, self.mass[own])
 
     def _merged_cells(self) -> list[Cells]:
         found: dict[tuple[str, bool], list[Cells]] = {}
@@ -215,9 +226,9 @@ class Assembly:
                     first += len(index)
         return tuple(blocks), np.concatenate(order)
 
-    def stable(self, added: Array) -> StableStep:
-        """Stable step with what contact springs add to the eigenvalue at each node [1/s^2]."""
-        return min(map(stable_step, self.computed(added)), key=lambda step: step.dt)
+    def stable(self, added: Array, body: str | None = None) -> StableStep:
+        """Stable step with what contact springs add to the eigenvalue at each node [1/s^2], of all or of one body."""
+        return min(map(stable_step, self.computed(added, body)), key=lambda step: step.dt)
 
     def element_steps(self, added: Array, *, coarse: bool = False) -> Array:
         """Stable step of each element by itself [s], as `stable_step.element_steps`, in the order of the meshes."""
@@ -226,11 +237,14 @@ class Assembly:
             steps[elements.index] = element_steps(elements, coarse=coarse)
         return steps
 
-    def computed(self, added: Array) -> Iterator[Elements]:
-        """Elements that are computed, by formulation, with masses less by `relief`."""
+    def computed(self, added: Array, body: str | None = None) -> Iterator[Elements]:
+        """Elements that are computed, by formulation, with masses less by `relief`; all, or those of one body."""
         added = added if self.relief is None else added * self.relief
         for part, own in zip(self.cells, self.element_mass, strict=True):
             kept = ~self.rigid[part.index]
+            if body is not None:
+                first = self.element_start[body]
+                kept &= (part.index >= first) & (part.index < first + self.meshes[body].cell_count)
             if kept.any():
                 some = slice(None) if kept.all() else kept  # without a copy
                 conn, index, mass = part.conn[some], part.index[some], own[some]

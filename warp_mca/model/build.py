@@ -11,6 +11,7 @@ import numpy as np
 from warp_mca.base.arrays import Array
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.assembly import Assembly
+from warp_mca.model.damping import greatest_decay, with_damping
 from warp_mca.model.mass_scaling import check_masses, scale_masses
 from warp_mca.model.model import Model
 from warp_mca.model.own_steps import OwnSteps
@@ -26,7 +27,7 @@ from warp_mca.physics.contact.skin_edges import edge_eigenvalues, edge_pass, is_
 from warp_mca.physics.contact.surfaces import ContactPass, contact_passes
 from warp_mca.physics.joints.constraints import check_bindings, constraints, free_nodes, join_bodies, nodes_of
 from warp_mca.physics.loads.joint_loads import hinge_loads, movable_bases
-from warp_mca.physics.loads.nodal import loaded_nodes
+from warp_mca.physics.loads.nodal import LoadedNodes, loaded_nodes
 from warp_mca.physics.rigid.bodies import RigidBody, check_loads, flexible, own_nodes, rigid_bodies
 from warp_mca.physics.rigid.stable_step import bounce_factor, stable_with_rigid
 from warp_mca.physics.ties.nodes import check_ties, on_faces, tied_nodes, velocities
@@ -117,11 +118,11 @@ def build_model(
     absorbing = absorbing_nodes(parts, velocity, held, pairs)
     added[absorbing.node] += absorbing.eigenvalues(parts.mass)
     loads = loaded_nodes(parts, start, added, grouping is not None)
-    rigid = rigid_bodies(parts, pairs, joints, couplings, passes, velocity)
+    rigid = rigid_bodies(parts, pairs, joints, couplings, passes, loads, velocity)
     check_ties(ties, held, [nodes_of(pairs), absorbing.node, *(body.nodes for body in rigid.bodies)])
     added, parts.relief = ties.shared(added, parts.mass), ties.relief(parts.mass)
     found: dict[str, Any] = {**_bodies(parts, watched), **held, **pairs}
-    found |= _steps(parts, rigid.bodies, added, velocity, passes)
+    found |= _steps(parts, rigid.bodies, added, velocity, passes, loads)
     model = Model(
         V=velocity,
         **found,
@@ -163,11 +164,17 @@ def _bodies(parts: Assembly, watched: Sequence[tuple[str, int]]) -> dict[str, An
 
 
 def _steps(
-    parts: Assembly, bodies: Sequence[RigidBody], added: Array, velocity: Array, passes: Sequence[ContactPass]
+    parts: Assembly,
+    bodies: Sequence[RigidBody],
+    added: Array,
+    velocity: Array,
+    passes: Sequence[ContactPass],
+    loads: Mapping[str, Sequence[LoadedNodes]],
 ) -> dict[str, Any]:
     """Stable step and mass scaling, by the name of the attribute; mass scaling raises the masses of the assembly."""
     plain = stable_with_rigid(parts, bodies, added, velocity) if bodies else parts.stable(added)
     stable, scaling = scale_masses(parts, added, plain)
-    stable = with_viscosity(stable, parts, velocity, sum(item.decay for item in passes))
+    decay = sum(item.decay for item in passes) + greatest_decay(loads, parts.mass)
+    stable = with_damping(with_viscosity(stable, parts, velocity, decay), parts, loads, added, decay)
     check_masses(parts, scaling)
     return {"stable": stable, "scaling": scaling}

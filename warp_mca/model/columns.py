@@ -12,10 +12,19 @@ if TYPE_CHECKING:
 
 
 class Added(NamedTuple):
-    """Columns of one actor: the first, and the entry of the ledger to which each of them adds."""
+    """Columns of one actor: the first, the entries of the ledger to which they add, and what stands behind these.
+
+    `readings` are columns of the history: each one of `Load.readings` of all loads, then the next.
+    """
 
     first: int
     energies: tuple[str, ...]
+    readings: tuple[str, ...] = ()
+
+    @property
+    def end(self) -> int:
+        """The first column behind its own."""
+        return self.first + len(self.energies) + len(self.readings)
 
 
 def pass_count(model: Model) -> int:
@@ -28,15 +37,21 @@ def added_columns(model: Model) -> dict[str, Added]:
 
     All scenes of a batch have the same kinds of loads; those without absorbing boundaries read fewer columns.
     """
-    kinds = {kind: LOADS[kind].energies for kind in model.loads}
-    kinds |= {"absorbing": model.absorbing.ENERGIES} if len(model.absorbing.node) else {}
+    kinds = {kind: (LOADS[kind].energies, _readings(model, kind)) for kind in model.loads}
+    kinds |= {"absorbing": (model.absorbing.ENERGIES, ())} if len(model.absorbing.node) else {}
     found, first = {}, PASS + PASS_COLUMNS * pass_count(model)
-    for name, energies in kinds.items():
-        found[name] = Added(first, energies)
-        first += len(energies)
+    for name, (energies, readings) in kinds.items():
+        found[name] = Added(first, energies, readings)
+        first = found[name].end
     return found
+
+
+def _readings(model: Model, kind: str) -> tuple[str, ...]:
+    """Columns of the history that loads of a kind have; of a batch those of its first scene, which has as many."""
+    names = [item.name for item in model.loads[kind] if item.scene == 0]
+    return tuple(column.format(name) for column in LOADS[kind].readings for name in names)
 
 
 def column_count(model: Model) -> int:
     """Columns of a record."""
-    return PASS + PASS_COLUMNS * pass_count(model) + sum(len(own.energies) for own in added_columns(model).values())
+    return max([PASS + PASS_COLUMNS * pass_count(model), *(own.end for own in added_columns(model).values())])

@@ -12,10 +12,8 @@ from numpy.typing import NDArray
 from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
 from warp_mca.base.joining import offsets
-from warp_mca.geometry.boxes import cell_boxes
-from warp_mca.geometry.cell_types import linear_type
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.geometry.point_location import LOCATE
+from warp_mca.geometry.point_location import around_point, weighted_set
 from warp_mca.physics.elements.cells import nodal_masses
 
 if TYPE_CHECKING:
@@ -108,29 +106,13 @@ def locate_sensors(scene: Scene, meshes: Mapping[str, Mesh]) -> Sensors:
 
 
 def _around(probe: Probe, mesh: Mesh) -> Spot:
-    """The corners of the cell around a point, with its shape functions there as weights."""
-    at = np.array([probe.at], dtype=np.float64)
-    found = []
-    for name, cells in mesh.cells.items():
-        if len(cells):
-            linear = linear_type(name)
-            corners = cells[:, : linear.corners]
-            found.append(LOCATE[linear.name](at, mesh.points, corners, cell_boxes(mesh.points, corners)))
-    corner, weight, apart, allowed = min(found, key=lambda cell: float(cell[2][0] - cell[3][0]))
-    if apart[0] > allowed[0]:
-        remedy = f"this point lies {apart[0]:.3g} m outside the body {probe.body}; give one of it, in its own frame"
-        raise bad_value(f"{probe.title}.at", probe.at, remedy)
-    kept = weight[0] != 0.0
-    return Spot(probe.body, corner[0][kept].astype(np.int32), weight[0][kept])
+    place = np.array(probe.at, dtype=np.float64)
+    return Spot(probe.body, *around_point(f"{probe.title}.at", probe.body, place, mesh))
 
 
 def _of_set(probe: Probe, mesh: Mesh, masses: Mapping[str, Array]) -> Spot:
-    """The nodes of a set, weighted with their masses; slaves of ties have none."""
     assert probe.nodes is not None
-    node = mesh.nodes(probe.nodes)
-    mass = masses[probe.body][node]
-    weight = mass if mass.any() else np.ones(len(node))
-    return Spot(probe.body, node.astype(np.int32), weight / weight.sum())
+    return Spot(probe.body, *weighted_set(mesh.nodes(probe.nodes), masses[probe.body]))
 
 
 def _cut(section: Section, mesh: Mesh) -> Cut:

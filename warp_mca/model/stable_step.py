@@ -34,12 +34,14 @@ class StableStep:
         element: the element that sets it.
         contact_share: share of omega_max^2 that contact springs add there [-].
         shortened: how many times shorter than the step of half of the elements it is, contact springs aside [-].
+        damped: how many times shorter than without the stiffness part of the damping of bodies it is [-].
     """
 
     dt: float
     element: int
     contact_share: float
     shortened: float
+    damped: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -128,6 +128,7 @@ class Story:
             "E_lost": np.full(count, totals.lost),
             "external_work": totals.external_work + work,
         }
+        rows |= {name: np.full(count, getattr(totals, key)) for name, key in self._spent.items()}
         rows |= self._angles(motion.chain.angles(run.theta_t).T)
         totals.external_work += float(work[-1])
         totals.joint += float(heat[-1])
@@ -138,6 +139,11 @@ class Story:
             facts=phase_facts("rigid", float(run.t[0]), run.t_end, run.ended_by, energy),
             sensors=sensors[kept],
         )
+
+    @property
+    def _spent(self) -> dict[str, str]:
+        """Entries of the ledger that loads within bodies add, by their columns."""
+        return {f"E_{key}": key for load in self.setup.scene.loads for key in load.energies}
 
     def _spot(self, part: SwingPart, spot: Spot) -> Array:
         """Where a probe is in its body's frame [m], shape (3,)."""
@@ -155,6 +161,7 @@ class Story:
         rows["time_s"] = part.start + rows["time_s"]
         rows["E_total_error"] = totals.error(stored) + spent - energies["external_work"]
         rows["E_friction"] = totals.friction + rows["E_friction"]
+        rows |= {name: getattr(totals, key) + rows[name] for name, key in self._spent.items()}
         rows["E_lost"] = np.full(len(stored), totals.lost)
         rows["external_work"] = totals.external_work + energies["external_work"]
         rows |= self._angles(_link_angles(self.setup, part))

@@ -135,6 +135,9 @@ def history_columns(ledger: Ledger, first: int = 0) -> dict[str, Array]:
         "plate_vz": velocity[:, 1, 2],
         "closing_speed": _closing_speed(ledger, first),
     }
+    for own in added_columns(model).values():
+        begin = own.first + len(own.energies)
+        columns |= {name: table[:, begin + k] for k, name in enumerate(own.readings)}
     added = {name for own in added_columns(model).values() for name in own.energies} - {"external_work"}
     return columns | {f"E_{name}": energy[name] for name in sorted(added)}
 

@@ -18,7 +18,7 @@ from warp_mca.model.assembly import GROUND
 from warp_mca.model.model import Model
 from warp_mca.phases.settings import Settings
 from warp_mca.physics.rigid.bodies import moves_with_rigid
-from warp_mca.rigid.equilibrium import equilibrium
+from warp_mca.rigid.equilibrium import TOLERANCE, equilibrium
 from warp_mca.step.solver import Solver
 from warp_mca.step.state import State
 
@@ -102,7 +102,7 @@ class Relaxation:
             u,
             self.model.X,
             self.masses,
-            elastic_energy=before[0] + before[2],
+            elastic_energy=max(before[0] + before[2], self._least(u)),
             held=self.held,
             name="the bodies",
             energy=self._energy,
@@ -111,6 +111,15 @@ class Relaxation:
         self._evaluate(u)
         elastic, plastic, hourglass = self._energies()
         return Shape(u=u, state=self.trial, elastic=elastic, plastic=plastic, hourglass=hourglass)
+
+    def _least(self, u: Array) -> float:
+        """Elastic energy of which the share TOLERANCE is no more than that of displacements rounded anyhow [J].
+
+        Bodies that nothing has strained have less, and no search would end within a share of that.
+        """
+        rounding = float(np.spacing(np.abs(self.model.X + u).max()))
+        omega = 2.0 / self.model.stable.dt
+        return 0.5 * float(self.model.mass.sum()) * (omega * rounding) ** 2 / TOLERANCE
 
     def _joined(self, u: Array) -> Array:
         """Displacements with tied nodes in one place, in the middle by mass, and nodes on the ground at theirs."""

@@ -162,7 +162,7 @@ class SceneRun:
             more |= rate_figures(model.rates, self.steps.dt, count, wall)
         if self.solver.layout.count > 1:
             more["batch"] = {"scene": self.index, "scenes": self.solver.layout.count}
-        more |= {"bodies": body_report(scene.bodies, self.ready.meshes), **mass_report(scene, model)}
+        more |= {"bodies": body_report(scene.bodies, self.ready.meshes, scene.masses), **mass_report(scene, model)}
         if ledger.absorbs:
             more["absorbed_impulse"] = self.solver.absorbing.impulses(self.state, self.index)
         if any(model.penalties):

@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     from warp_mca.step.state import State
 
 Array = NDArray[np.float64]
-STEPS = 10  # between two looks at the kinetic energy
+STEPS = 10  # between two looks at the kinetic energy at most
+LOOKS = 8  # at least until it is at its greatest
 ROWS = 500  # of the history, where it lasts as long as it may
 
 
@@ -52,7 +53,7 @@ def settle(phase: Settle, impact: Impact, tell: Callable[[float], None]) -> Stre
     motion = HalfSteps(impact)
     motion.slow(0.0)
     greatest = kinetic = 0.0
-    quiet = reached = count = 0
+    quiet = reached = 0
     passed = False
     while quiet <= reached:
         if state.steps >= steps.count - STEPS:
@@ -60,14 +61,16 @@ def settle(phase: Settle, impact: Impact, tell: Callable[[float], None]) -> Stre
                 f"bodies do not rest after Settle.duration = {phase.duration:g} s: their kinetic energy is still "
                 f"{kinetic / greatest:.2g} of its greatest value; give a longer duration, or hold what falls"
             )
-        impact.advance(until=state.steps + STEPS)
+        stride = max(1, min(STEPS, state.steps // LOOKS))
+        impact.advance(until=state.steps + stride)
         tell(state.steps / steps.count)
-        kinetic, count = motion.look(), count + 1
+        kinetic = motion.look()
         if kinetic > greatest:
-            greatest, reached = kinetic, count
-        quiet = 0 if kinetic > phase.tolerance * greatest else quiet + 1
+            greatest, reached = kinetic, state.steps
+        quiet = 0 if kinetic > phase.tolerance * greatest else quiet + stride
         rising, passed = not passed and kinetic == greatest, passed or kinetic < greatest
-        motion.slow(1.0 if rising else math.exp(-math.pi / reached) if count > reached + 1 else 0.0)
+        later = state.steps > reached + stride
+        motion.slow(1.0 if rising else math.exp(-math.pi * stride / reached) if later else 0.0)
     motion.rest(fine.per_interval - 1)
     stretch = stretch_ended(impact, "settle", "rest", fine)
     motion.release(impact.scene_runs[0])
@@ -105,7 +108,9 @@ class HalfSteps:
             parameters.zero_()
 
     def look(self) -> float:
-        """Kinetic energy of the bodies that settle [J].
+        """Kinetic energy of the bodies that settle, the mean of those half a step before and after [J].
+
+        That of records, v(n-1/2) . M v(n+1/2) / 2, is below 0 where bodies turn back.
 
         Raises:
             GuardError: a guard has stopped the phase.
@@ -114,7 +119,8 @@ class HalfSteps:
             raise GuardError(f"before the impact: {self.impact.stopped[0]}")
         self.now = self._half_steps()
         (before, *_), (after, *_) = self.now
-        return self._kinetic(before, after, ~self.waiting[0])
+        settling = ~self.waiting[0]
+        return 0.5 * (self._kinetic(before, before, settling) + self._kinetic(after, after, settling))
 
     def slow(self, factor: float) -> None:
         """Let bodies that wait be where they were without velocity, and the others keep a factor of theirs."""
@@ -141,10 +147,12 @@ class HalfSteps:
         for parameters, values in self.dashpots:
             parameters.assign(values)
         kept, state = scene_run.ledger.kept, self.state
-        at_rest = self.look()
+        self.look()
+        (before, *_), (after, *_) = self.now
+        at_rest = self._kinetic(before, after, ~self.waiting[0])
         self._give(self.initial, False)
-        before = np.array(state.v.numpy(), dtype=np.float64)
-        given = self._kinetic(before, 2.0 * self.initial[0] - before, self.waiting[0])
+        v = np.array(state.v.numpy(), dtype=np.float64)
+        given = self._kinetic(v, 2.0 * self.initial[0] - v, self.waiting[0])
         kept.initial_energy += given
         kept.initial_kinetic = at_rest + given
         state.normal_force.zero_()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -172,6 +173,20 @@ class Result:
         )
 
 
+def spring_extremes(history: Mapping[str, Array]) -> dict[str, Any]:
+    """Greatest and least tension [N] and elongation [m] of each spring by name, under "springs"; empty without any."""
+    names = [name.removeprefix("spring_").removesuffix("_N") for name in history if re.fullmatch("spring_.+_N", name)]
+    found = {
+        name: {
+            f"{what}_{end}": float(least_or_greatest(history[f"spring_{name}_{unit}"]))
+            for what, unit in (("force", "N"), ("elongation", "m"))
+            for end, least_or_greatest in (("min", np.min), ("max", np.max))
+        }
+        for name in names
+    }
+    return {"springs": found} if found else {}
+
+
 def summarise(
     history: Mapping[str, Array], facts: Mapping[str, Any], pairs: Sequence[ContactHistory] = ()
 ) -> dict[str, Any]:
@@ -203,6 +218,7 @@ def summarise(
         "contacts_by_pair": [pair.summary(time) for pair in pairs],
         "sticks": [list(stick) for stick in stick_intervals(time, F_n, history["stick_fraction"])],
         "element_steps_per_s": facts["n_elements"] * facts["n_steps"] / fe_wall if fe_wall > 0.0 else None,
+        **spring_extremes(history),
         "version": __version__,
         **{key: value for key, value in facts.items() if key not in FACTS},
     }

@@ -13,6 +13,8 @@ UNITS = (
     (r"(tip|plate)_v[xyz]|closing_speed", "m/s"),
     (r"E_\w+|external_work", "J"),
     (r"theta_.+", "rad"),
+    (r"spring_.+_N", "N"),
+    (r"spring_.+_m", "m"),
 )
 
 

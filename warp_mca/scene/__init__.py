@@ -10,14 +10,17 @@ from warp_mca.scene.bodies import Body, Vec3
 from warp_mca.scene.bonds import Bond
 from warp_mca.scene.contact_laws import DampedPenalty, Penalty
 from warp_mca.scene.contacts import OVERLAP_CHOICES, Contact, ContactAll, RigidPlane, Surface
+from warp_mca.scene.damping import Damping
 from warp_mca.scene.drives import Fixed, Prescribed
 from warp_mca.scene.friction_laws import DecayingFriction, ShearCap
 from warp_mca.scene.joints import Prismatic, Revolute, Spherical, Weld
 from warp_mca.scene.loads import BodyForce, Force, Pressure, ThermalStrain, Traction
+from warp_mca.scene.masses import PointMass
 from warp_mca.scene.phases import BaseMotion, ImpactPhase, JointTorque, RigidPhase, Settle, Slide, Tip
 from warp_mca.scene.probes import Line, Path, Point
 from warp_mca.scene.scene import Scene
 from warp_mca.scene.sensors import Probe, Section
+from warp_mca.scene.springs import Spring
 from warp_mca.scene.tied_surfaces import Tie
 
 __all__ = [
@@ -31,6 +34,7 @@ __all__ = [
     "Contact",
     "ContactAll",
     "DampedPenalty",
+    "Damping",
     "DecayingFriction",
     "Fixed",
     "Force",
@@ -40,6 +44,7 @@ __all__ = [
     "Path",
     "Penalty",
     "Point",
+    "PointMass",
     "Prescribed",
     "Pressure",
     "Prismatic",
@@ -53,6 +58,7 @@ __all__ = [
     "Spherical",
     "Settle",
     "Slide",
+    "Spring",
     "Surface",
     "ThermalStrain",
     "Tie",

@@ -26,12 +26,19 @@ class Load:
         energies: entries of the energy ledger to which a kind adds, in the order of `NodalLoad.energies`.
         refuses: what a kind cannot be combined with, "multi_rate" or "run_batch", and the remedy, for the error.
         module: whose `build` and `Stage` the methods `build` and `stage` stand for, where a kind does not write these.
+        readings: columns of the history of each load of a kind, with its name in place of {}, in the order of
+            `NodalLoad.readings_of`.
+        on_rigid: whether it may act on nodes of rigid bodies.
+        inner: whether it acts between points of one body alone, so that bodies that move as rigid ones do not feel it.
     """
 
     body: str
     energies: ClassVar[tuple[str, ...]] = ("external_work",)
     refuses: ClassVar[Mapping[str, str]] = {}
     module: ClassVar[str] = ""
+    readings: ClassVar[tuple[str, ...]] = ()
+    on_rigid: ClassVar[bool] = False
+    inner: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         validate.plain(self)

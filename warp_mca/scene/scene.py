@@ -15,6 +15,7 @@ from warp_mca.scene.contacts import Contact, ContactAll, RigidPlane, Surface
 from warp_mca.scene.drives import Fixed, Prescribed
 from warp_mca.scene.joints import JOINTS, Joint, Prismatic, Weld
 from warp_mca.scene.loads import LOADS, Load
+from warp_mca.scene.masses import PointMass
 from warp_mca.scene.phases import PHASES, ImpactPhase, RigidPhase
 from warp_mca.scene.probes import Path, Point
 from warp_mca.scene.sensors import Probe, Section, check_class
@@ -27,6 +28,7 @@ _PARTS = {
     "fixed": Fixed,
     "prescribed": Prescribed,
     "absorbing": Absorbing,
+    "masses": PointMass,
     "paths": Path,
     "probes": Probe,
     "sections": Section,
@@ -49,6 +51,7 @@ class Scene:
         phases: of finite elements that come before the impact, in their order, as `(Settle(),)`.
         joints, contacts, fixed, prescribed, ties: what binds the bodies; contacts="all" stands for (ContactAll(),).
         absorbing: sides of bodies through which waves leave.
+        masses: point masses on bodies.
         loads: forces on nodes in the impact phase, of the kinds in `scene.loads.LOADS`.
         gravity: [m/s^2].
         up: direction that points up in pictures [-], of any length; None takes the one opposite to gravity, else the
@@ -75,6 +78,7 @@ class Scene:
     prescribed: tuple[Prescribed, ...] = ()
     absorbing: tuple[Absorbing, ...] = ()
     ties: tuple[Tie, ...] = ()
+    masses: tuple[PointMass, ...] = ()
     loads: tuple[Load, ...] = ()
     paths: tuple[Path, ...] = ()
     probes: tuple[Probe, ...] = ()
@@ -101,6 +105,9 @@ class Scene:
         validate.kinds("Scene", (RigidPhase, NoneType), "give a RigidPhase or None", rigid=self.rigid)
         self._check_t_end()
         self._check_phases()
+        if self.masses and self.rigid:
+            remedy = "links of a RigidPhase have the mass of their meshes alone; leave one of them out"
+            raise bad_value("Scene.masses", "PointMass", remedy)
         validate.within("Scene", 1.0 / FINEST, FINEST, refine=self.refine)
         validate.kinds("Scene", (Point, NoneType), "give a Point or None", tip=self.tip, target=self.target)
         validate.kinds("Scene", Mapping, "give a dict of values by name", parameters=self.parameters)
@@ -169,7 +176,7 @@ class Scene:
             raise bad_value("ImpactPhase.mass_scaling", self.impact.mass_scaling, remedy)
         for present, why in (
             (self.absorbing, "a cut body with absorbing sides does not move between impacts as the large one"),
-            (self.loads, "loads act in an impact alone, not in the swings between"),
+            ([a for a in self.loads if not a.inner], "loads act in an impact alone, not in the swings between"),
             (any(item.bond for item in self.listed), "bonds act in an impact alone, not in the swings between"),
             (self.prescribed, "nodes with a Prescribed velocity cannot follow it between impacts"),
         ):
@@ -206,7 +213,7 @@ class Scene:
         return [(field, surface) for field, surface in named if isinstance(surface, Surface)]
 
     def _named_bodies(self) -> list[tuple[str, str]]:
-        named = [(f"{type(item).__name__}.body", item.body) for item in self._held]
+        named = [(f"{type(item).__name__}.body", item.body) for item in (*self._held, *self.masses)]
         named += [(f"{type(load).__name__}.{key}", body) for load in self.loads for key, body in load.bodies().items()]
         named += [(f"{item.title}.body", item.body) for item in self.joints]
         named += [(f"{item.title}.other", item.other) for item in self.joints if item.other is not None]
@@ -232,7 +239,8 @@ class Scene:
                 if joint.other is not None and joint.other_nodes is not None:
                     named.append((f"{joint.title}.other_nodes", joint.other, joint.other_nodes, False))
         named += [(f"{field}.nodes", surface.body, surface.nodes, True) for field, surface in self._surfaces()]
-        return named + [(f"{p.title}.nodes", p.body, p.nodes, False) for p in self.probes if p.nodes is not None]
+        points = (*self.probes, *self.masses)
+        return named + [(f"{p.title}.nodes", p.body, p.nodes, False) for p in points if p.nodes is not None]
 
     @property
     def listed(self) -> tuple[Contact, ...]:

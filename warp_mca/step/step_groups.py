@@ -23,7 +23,8 @@ STEP: tuple[tuple[str, ...], ...] = (
     ("frames",),  # u(n) in frames that float with bodies
     ("forces", "keep", "search"),  # f(n) of elements, contacts and loads at u(n), v(n-1/2); what records read later
     ("energies",),  # at t(n), from what was kept: a GPU goes on with the nodes beside them
-    ("look", "sums", "picture"),  # what recorders show of springs, whose sums then begin anew; stresses at nodes
+    ("look", "sums", "picture", "damp"),  # what recorders show of springs, whose sums then begin anew; stresses at
+    # nodes; forces of damping, which follow from those of elements
     ("advance",),  # v(n+1/2) = v(n-1/2) + dt f(n) / m, u(n+1) = u(n) + dt v(n+1/2)
     ("follow", "correct"),  # nodes that others carry; torques in joints, on the velocities that all else gave
     ("motion", "works"),  # sums at t(n), from velocities half a step before and after it

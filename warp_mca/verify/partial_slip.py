@@ -42,7 +42,13 @@ def rubbed_spheres(section: int, pole_size: float) -> mca.Scene:
     steel = mca.Elastic(E=E, nu=NU, rho=7850.0)
     turns = {"lower": 0.5 * math.pi, "upper": -0.5 * math.pi}
     bodies = [
-        mca.Body(name=name, geometry=mesh, material=steel, position=(0.0, -math.copysign(R, turn), 0.0), rotation=(0.0, 0.0, turn))
+        mca.Body(
+            name=name,
+            geometry=mesh,
+            material=steel,
+            position=(0.0, -math.copysign(R, turn), 0.0),
+            rotation=(0.0, 0.0, turn),
+        )
         for name, turn in turns.items()
     ]
     depth = 2.0 * CONTACT**2 / R
@@ -99,4 +105,5 @@ def partial_slip(setup: Setup) -> list[Row]:
         P, Q, found = of_cycle(setup.run(rubbed_spheres(2 * round(1e-3 / size), size)))
         exact = np.append(exact, heat_of_cycle(P, Q))
         heat.append(found / heat_of_cycle(P, Q))
-    return [Row("heat over that of the forces", 1.0, heat, "-", 0.05, "a / R is 0.08; cells are a quarter and an eighth of a")]
+    cells = "a / R is 0.08; cells are a quarter and an eighth of a"
+    return [Row("heat over that of the forces", 1.0, heat, "-", 0.05, cells)]

@@ -16,13 +16,15 @@ if TYPE_CHECKING:
 
     from warp_mca.geometry.mesh import Mesh
     from warp_mca.model.model import Model
-    from warp_mca.scene import Body, Scene
+    from warp_mca.scene import Body, PointMass, Scene
 
 
-def body_report(bodies: Sequence[Body], meshes: Mapping[str, Mesh]) -> dict[str, dict[str, float | None]]:
+def body_report(
+    bodies: Sequence[Body], meshes: Mapping[str, Mesh], points: Sequence[PointMass] = ()
+) -> dict[str, dict[str, float | None]]:
     """Mass [kg] of each body, without what mass scaling adds, and error [-] of the mass of its cells, by its name.
 
-    The error is None where nothing is known of the shape that the mesh stands for.
+    The error is None where nothing is known of the shape that the mesh stands for. `points` count as mass alone.
     """
     found: dict[str, dict[str, float | None]] = {}
     for body in bodies:
@@ -31,7 +33,8 @@ def body_report(bodies: Sequence[Body], meshes: Mapping[str, Mesh]) -> dict[str,
         ratio = of_cells(mesh)
         cells, shape = (mass / ratio, mass) if body.exact_mass else (mass, mass * ratio)
         error = float(cells.sum() / shape.sum()) - 1.0 if len(mesh.volume_ratio) else None
-        found[body.name] = {"mass": float(mass.sum()), "mass_error": error}
+        carried = sum(item.mass for item in points if item.body == body.name)
+        found[body.name] = {"mass": float(mass.sum()) + carried, "mass_error": error}
     return found
 
 

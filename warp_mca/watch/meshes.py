@@ -11,7 +11,7 @@ import numpy as np
 from warp_mca.geometry import Box, Mesh, NestedPlate, Parts, Plate, Rod, Sphere
 from warp_mca.geometry.quality import doubled_nodes, pieces
 from warp_mca.physics.contact.sides import face_geometry
-from warp_mca.scene import Prismatic, RigidPlane, Weld
+from warp_mca.scene import Damping, Prismatic, RigidPlane, Weld
 from warp_mca.watch.mass_report import body_report
 from warp_mca.watch.row import Context, Finished, Kind, Values, When, row
 
@@ -42,6 +42,20 @@ def sliver(c: Context, most: float) -> Iterator[Values]:
         mesh = c.meshes[name]
         x, y, z = mesh.points[mesh.cell(element)].mean(axis=0)
         yield dict(element=element, body=name, x=x, y=y, z=z, times=stable.shortened)
+
+
+@advice(
+    "the damping of body {body} makes the time step {times:.1f} times shorter;",
+    "leave its stiffness out, and give a loss_factor over the band of frequencies that matter",
+    1.5,
+    "times at most",
+)
+def costly_damping(c: Context, most: float) -> Iterator[Values]:
+    """By how much the stiffness part of the damping of a body shortens the stable step."""
+    damping = [load for load in c.scene.loads if isinstance(load, Damping) and load.stiffness]
+    if damping and c.model.stable.damped > most:
+        name, _ = c.model.owner(c.model.stable.element)
+        yield dict(body=name, times=c.model.stable.damped)
 
 
 @advice(

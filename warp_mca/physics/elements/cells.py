@@ -13,6 +13,7 @@ from warp_mca.base.errors import bad_value
 from warp_mca.geometry.cell_types import CELL_TYPES
 from warp_mca.geometry.degenerate import among
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.geometry.point_location import around_point, weighted_set
 from warp_mca.geometry.shape_volume import of_cells
 from warp_mca.physics.elements import ELEMENTS, Element, default_element
 from warp_mca.physics.ties.nodes import within_body
@@ -133,5 +134,27 @@ def nodal_masses(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, Array]:
         total = np.zeros(len(points))
         for part in body_cells(body, mesh):
             total += sum_to_nodes(part.conn, element_masses(part, points, rho), len(total))
-        masses[body.name] = ties.carried(total)
+        masses[body.name] = ties.carried(total + point_masses(scene, mesh, body.name, total))
     return masses
+
+
+def point_masses(scene: Scene, mesh: Mesh, body: str, mass: Array) -> Array:
+    """What the point masses of a body add to the mass of each of its nodes [kg], shape (node_count,), float64.
+
+    Args:
+        scene: with the point masses.
+        mesh, body: of the body, and its name.
+        mass: of its nodes without them [kg], shape (node_count,), float64.
+
+    Raises:
+        RequestError: one lies outside the body.
+    """
+    added = np.zeros(len(mesh.points))
+    for item in (item for item in scene.masses if item.body == body):
+        if item.nodes is None:
+            place = np.array(item.at, dtype=np.float64)
+            node, weight = around_point(f"{item.title}.at", body, place, mesh)
+        else:
+            node, weight = weighted_set(mesh.nodes(item.nodes), mass)
+        np.add.at(added, node, item.mass * weight)
+    return added

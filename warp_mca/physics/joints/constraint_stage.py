@@ -13,7 +13,7 @@ from warp_mca.kernels.nodes import slide
 from warp_mca.kernels.nodes.constraint import Bonds
 from warp_mca.kernels.nodes.gather import BOUND, TOUCHABLE
 from warp_mca.physics.actor import Actor, When
-from warp_mca.physics.rigid.bodies import rigid_nodes
+from warp_mca.physics.rigid.bodies import moves_with_rigid, rigid_nodes
 from warp_mca.step.stage import BESIDE, Stage
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ class ConstraintStage(Actor):
         rails: first slider, first node and end of each in `bonds.first`, shape (rail_count,), vec3i.
         bonds: pairs, driven nodes and their tables.
         role: of each node, shape (node_count,), uint8; empty where nothing is bound, at rest or touched.
-        at_rest: the same of a model without joints, driven axes and absorbing boundaries.
+        at_rest: the same of a model without joints, driven axes and absorbing boundaries, but with rigid bodies.
         pairs, driven: their numbers.
         driven_first: first driven node of each scene, and the number of all, shape (scene_count + 1,), int32.
     """
@@ -72,6 +72,8 @@ class ConstraintStage(Actor):
             role[item.node] |= TOUCHABLE
         if not self.bound and not role.any():
             role = role[:0]
+        if model.rigid_bodies:
+            role[moves_with_rigid(model)] |= BOUND  # forces on them at the start are those of rigid bodies
         self.at_rest = wp.array(role, dtype=wp.uint8)
         for bound in (model.joint_first, model.joint_second[model.joint_second >= 0], nodes, *others):
             role[bound] |= BOUND

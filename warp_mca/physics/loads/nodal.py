@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
-from warp_mca.base.joining import SCENE, joinable, of
+from warp_mca.base.joining import AS_IS, SCENE, joinable, of
 from warp_mca.model.assembly import Assembly
 from warp_mca.scene.loads import LOADS, Load
 
@@ -28,10 +28,12 @@ class LoadedNodes:
         node: on which it acts, shape (count,), int32.
         on_nodes: whether it acts on any at all.
         scene: number of the scene in a batch.
+        name: of the load, for columns of the history.
     """
 
     node: NDArray[np.int32] = field(metadata=of("nodes"))
     scene: int = field(default=0, metadata=SCENE)
+    name: str = field(default="", metadata=AS_IS)
     on_nodes: ClassVar[bool] = True
 
     def impulse(self, duration: float) -> float:
@@ -42,6 +44,13 @@ class LoadedNodes:
         """What it adds at each of its nodes to the eigenvalue that bounds the stable step [1/s^2], shape (count,).
 
         `mass` is that of all nodes [kg], shape (node_count,).
+        """
+        return np.zeros(len(self.node))
+
+    def decays(self, mass: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Rate of decay of its dashpots at each of its nodes, as part of M^-1 C [1/s], shape (count,).
+
+        They read the velocity of half a step before. `mass` as above.
         """
         return np.zeros(len(self.node))
 
@@ -60,7 +69,7 @@ def loaded_nodes(
     for load in parts.scene.loads:
         kind = type(load).__name__
         for name, body in load.bodies().items():
-            if parts.scene.body(body).rigid:
+            if parts.scene.body(body).rigid and not load.on_rigid:
                 raise bad_value(f"{kind}.{name}", body, "loads act on nodes of flexible bodies; leave rigid off")
         if not isinstance(load.refuses, Mapping):
             raise bad_value(f"{kind}.refuses", load.refuses, "give a dict of remedies by what it does not go with")
@@ -97,7 +106,7 @@ def load_speed(model: Model, duration: float) -> float:
     return float((impulse / np.where(impulse > 0.0, mass, 1.0)).max())
 
 
-def check_batch(scenes: Sequence[Mapping[str, object]]) -> None:
+def check_batch(scenes: Sequence[Mapping[str, Sequence[object]]]) -> None:
     """Refuse scenes of a batch whose kinds of loads differ, or that have a kind which no batch can.
 
     Args:
@@ -110,6 +119,9 @@ def check_batch(scenes: Sequence[Mapping[str, object]]) -> None:
         if loads.keys() != scenes[0].keys():
             differing = ", ".join(sorted(loads.keys() ^ scenes[0].keys()))
             raise bad_value("Scene.loads", differing, "scenes of a batch have loads of the same kinds; run them apart")
+        for kind in (kind for kind in loads if LOADS[kind].readings and len(loads[kind]) != len(scenes[0][kind])):
+            remedy = "scenes of a batch have as many of them each, which are recorded; run them apart"
+            raise bad_value("Scene.loads", f"{len(loads[kind])} {kind}", remedy)
     for kind in scenes[0]:
         if "run_batch" in LOADS[kind].refuses:
             raise bad_value("Scene.loads", kind, f"it does not go with run_batch; {LOADS[kind].refuses['run_batch']}")

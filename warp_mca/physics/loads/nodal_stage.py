@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.base.joining import offsets
-from warp_mca.kernels.records.entries import sum_entries
+from warp_mca.kernels.records.entries import list_entries, sum_entries
 from warp_mca.model.columns import added_columns
 from warp_mca.physics.actor import Actor, When
 from warp_mca.step.stage import BEYOND, Stage, Step
@@ -28,7 +28,11 @@ class NodalLoad(Actor):
         items: the loads, those of each scene in turn.
         column: of a record, the first that they add.
         count: numbers that hold the energies of all.
+        place, stream: of the stage of its forces: by default in the stream of contact, which adds to the same ones.
     """
+
+    place: ClassVar[str] = "forces"
+    stream: ClassVar[str] = BEYOND
 
     def __init__(self, solver: Solver, name: str) -> None:
         """Allocate on the current device."""
@@ -60,8 +64,12 @@ class NodalLoad(Actor):
         """Of each of `Load.energies` at t(n) [J], shape (count,), float64: `entries` of each load in turn."""
         raise NotImplementedError
 
+    def readings_of(self, state: State) -> Sequence[wp.array]:
+        """Of each of `Load.readings` at t(n), an entry for each load, shape (len(items),), float64."""
+        return []
+
     def record_kernels(self) -> list[Any]:
-        """That of the sums."""
+        """That of the sums, and of what is read off each load."""
         return [sum_entries]
 
     def start_forces(self, state: State) -> None:
@@ -69,11 +77,16 @@ class NodalLoad(Actor):
         self.push(Step(state), start=True)
 
     def stages(self, when: When) -> Iterable[Stage]:
-        """Forces, in the stream of contact, which adds to the same ones; energies of each scene."""
+        """Forces; energies of each scene."""
         if when.common:
-            yield Stage("forces", f"loads: {self.name}", self.push, BEYOND)
+            yield Stage(self.place, f"loads: {self.name}", self.push, self.stream)
         yield Stage("works", f"energies: {self.name}", self._sum, only_records=True)
 
     def _sum(self, step: Step) -> None:
         for k, entry in enumerate(self.energies_of(step.state)):
             self.solver.records.sum_runs(sum_entries, self.most, [self.column + k, self.first, entry])
+        column = self.column + len(self.energies_of(step.state))
+        for entry in self.readings_of(step.state):
+            inputs = [self.work.row, column, self.first, entry]
+            wp.launch(list_entries, len(entry), inputs=inputs, outputs=[self.work.partial])
+            column += self.most

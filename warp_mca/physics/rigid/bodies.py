@@ -17,6 +17,7 @@ from warp_mca.physics.contact.surfaces import ContactPass
 from warp_mca.physics.joints.constraints import JointPairs
 from warp_mca.physics.joints.couplings import Coupling
 from warp_mca.physics.loads.joint_loads import MovableBase
+from warp_mca.physics.loads.nodal import LoadedNodes
 from warp_mca.physics.rigid.rows import RigidPin, RigidRow, check_joint, fixed_rows, joint_rows, pin_of, pin_rows
 from warp_mca.scene import Scene
 
@@ -33,7 +34,7 @@ class RigidBody:
     Attributes:
         name: of the body.
         own: its nodes, shape (node_count,), int32.
-        loaded: those among them on which contact may act, int32.
+        loaded: those among them on which contact or loads may act, int32.
         riders: shape (rider_count,), int32.
         pairs: pair of `Model.joint_first` that ties each rider, shape (rider_count,), int32.
         signs: 1 where a rider is the first node of its pair, -1 where it is the second, shape (rider_count,), float64.
@@ -113,6 +114,7 @@ def rigid_bodies(
     joints: Sequence[JointPairs],
     couplings: Sequence[Coupling],
     passes: Sequence[ContactPass],
+    loads: Mapping[str, Sequence[LoadedNodes]],
     velocity: Array,
 ) -> Rigid:
     """The rigid bodies of a scene and what binds them.
@@ -122,6 +124,7 @@ def rigid_bodies(
         pairs, joints: as in `Model`.
         couplings: of all joints between clusters.
         passes: of its contacts.
+        loads: on its nodes, by kind.
         velocity: initial velocities [m/s], shape (node_count, 3), float64.
 
     Raises:
@@ -140,6 +143,8 @@ def rigid_bodies(
     touched = np.zeros(len(parts.X), dtype=bool)
     for item in passes:
         touched[item.slave], touched[item.master] = True, True
+    for item in (item for items in loads.values() for item in items):
+        touched[item.node] = True
     bodies = [_body(parts, name, own, touched, pairs, owner) for name, own in nodes.items()]
     pins: list[RigidPin] = []
     rows = []

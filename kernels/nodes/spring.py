@@ -1,0 +1,171 @@
+"""Owns springs and dashpots between points of bodies, or a point and the ground.
+
+A point is the mean x = sum w X of some nodes, so that a force F on it is w F on each. With the direction n from the
+first point to the second one, and the length L between them, the tension is
+
+    T = T_s(L - L_0) + T_d(dL/dt),   w T n on the nodes of the first point, -w T n on those of the second.
+
+T_s and T_d are piecewise linear, beyond their ends with the slope there. At t(n) the speed is known half a step before;
+what T itself adds until t(n) counts, by the lightness l of both points (1/m of a mass):
+
+    T (1 + dt l T_d' / 2) = T_s + T_d(speed at n-1/2),
+
+so that a dashpot between two masses sees the mean of the speeds before and after, as central differences want it.
+"""
+
+import warp as wp
+
+from warp_mca.kernels.hardware.block import block_sum, wait_for_block
+
+LEAST = 1e-12  # share of the length at the start below which the direction is not known
+
+
+@wp.struct
+class Springs:
+    """The springs of a model.
+
+    Attributes:
+        begin: first entry in `node` of the first and the second point of each, and the number of all, shape (2
+            spring_count + 1,), int32; a second point without nodes stays in place.
+        node: shape (entry_count,), int32.
+        weight: w of each [-], shape (entry_count,), float64.
+        ground: place of second points without nodes [m], shape (spring_count,), vec3d.
+        direction: n where it stays as it is, else zero [-], shape (spring_count,), vec3d.
+        length: L_0 [m], shape (spring_count,), float64.
+        preload: tension at L_0 beside that of the table [N], shape (spring_count,), float64.
+        rest: elongation at which no energy is stored [m], shape (spring_count,), float64.
+        lightness: l [1/kg], shape (spring_count,), float64.
+        tables: first entry of T_s and T_d of each in `x` and `y`, and the number of all, shape (2 spring_count + 1,),
+            int32.
+        x: elongations [m] and speeds [m/s], float64.
+        y: tensions [N], float64.
+    """
+
+    begin: wp.array(dtype=wp.int32)
+    node: wp.array(dtype=wp.int32)
+    weight: wp.array(dtype=wp.float64)
+    ground: wp.array(dtype=wp.vec3d)
+    direction: wp.array(dtype=wp.vec3d)
+    length: wp.array(dtype=wp.float64)
+    preload: wp.array(dtype=wp.float64)
+    rest: wp.array(dtype=wp.float64)
+    lightness: wp.array(dtype=wp.float64)
+    tables: wp.array(dtype=wp.int32)
+    x: wp.array(dtype=wp.float64)
+    y: wp.array(dtype=wp.float64)
+
+
+@wp.struct
+class SpringState:
+    """What the springs keep at t(n).
+
+    Attributes:
+        energy: stored in each [J], shape (spring_count,), float64.
+        taken: by its dashpot [J], shape (spring_count,), float64.
+        tension: T [N], shape (spring_count,), float64.
+        elongation: L - L_0 [m], shape (spring_count,), float64.
+        damper: tension of its dashpot along n [N], shape (spring_count,), vec3d.
+        clock: 1 once it has taken a step [-], shape (spring_count,), int32.
+    """
+
+    energy: wp.array(dtype=wp.float64)
+    taken: wp.array(dtype=wp.float64)
+    tension: wp.array(dtype=wp.float64)
+    elongation: wp.array(dtype=wp.float64)
+    damper: wp.array(dtype=wp.vec3d)
+    clock: wp.array(dtype=wp.int32)
+
+
+@wp.func
+def table_at(begin: int, end: int, x: wp.array(dtype=wp.float64), y: wp.array(dtype=wp.float64), at: wp.float64):
+    """Value, slope, and integral from the first entry of a piecewise linear table; all zero without entries."""
+    if end - begin < 2:
+        return wp.vec3d()
+    k = int(begin)
+    area = wp.float64(0.0)
+    while k < end - 2 and at > x[k + 1]:
+        area += wp.float64(0.5) * (y[k] + y[k + 1]) * (x[k + 1] - x[k])
+        k += 1
+    slope = (y[k + 1] - y[k]) / (x[k + 1] - x[k])
+    way = at - x[k]
+    return wp.vec3d(y[k] + slope * way, slope, area + way * (y[k] + wp.float64(0.5) * slope * way))
+
+
+@wp.func
+def ends_of(j: int, lane: int, springs: Springs, values: wp.array(dtype=wp.vec3d)):
+    """Values of nodes at the second point of spring j, if it has nodes, less those at the first one.
+
+    All threads of the block call this and get it.
+    """
+    found = wp.vec3d()
+    begin = springs.begin[2 * j]
+    middle = springs.begin[2 * j + 1]
+    for e in range(begin + lane, springs.begin[2 * j + 2], wp.block_dim()):
+        value = springs.weight[e] * values[springs.node[e]]
+        if e < middle:
+            value = -value
+        found += value
+    return block_sum(found)
+
+
+@wp.func
+def count_taken(j: int, damper: wp.vec3d, speed: wp.vec3d, dt: wp.float64, state_out: SpringState):
+    """Add what the dashpot took since the step before: half of both tensions times the speed between."""
+    if state_out.clock[j] > 0:
+        taken = wp.float64(0.5) * dt * wp.dot(state_out.damper[j] + damper, speed)
+        state_out.taken[j] = state_out.taken[j] + taken
+    state_out.damper[j] = damper
+    state_out.clock[j] = 1
+
+
+@wp.kernel(enable_backward=False)
+def pull_springs(
+    first: wp.array(dtype=wp.int32),
+    springs: Springs,
+    X: wp.array(dtype=wp.vec3d),
+    u: wp.array(dtype=wp.vec3d),
+    v: wp.array(dtype=wp.vec3d),
+    dt: wp.float64,
+    keeps: bool,
+    nodal_force_out: wp.array(dtype=wp.vec3d),
+    state_out: SpringState,
+):
+    """Add the forces of springs; a block of threads takes the springs of a scene in turn, which may share nodes.
+
+    With `keeps`, their state at t(n) is kept: energy, what dashpots took, tension and elongation.
+    """
+    scene, lane = wp.tid()
+    for j in range(first[scene], first[scene + 1]):
+        begin = springs.begin[2 * j]
+        middle = springs.begin[2 * j + 1]
+        end = springs.begin[2 * j + 2]
+        between = ends_of(j, lane, springs, X) + ends_of(j, lane, springs, u)
+        speed = ends_of(j, lane, springs, v)
+        if end == middle:
+            between += springs.ground[j]
+        n = springs.direction[j]
+        if wp.length_sq(n) == wp.float64(0.0):
+            n = between / wp.max(wp.length(between), wp.float64(LEAST) * wp.abs(springs.length[j]) + wp.float64(1e-300))
+        e = wp.dot(n, between) - springs.length[j]
+        rate = wp.dot(n, speed)
+        stiff = table_at(springs.tables[2 * j], springs.tables[2 * j + 1], springs.x, springs.y, e)
+        damp = table_at(springs.tables[2 * j + 1], springs.tables[2 * j + 2], springs.x, springs.y, rate)
+        spring = springs.preload[j] + stiff[0]
+        T = spring + damp[0]
+        if keeps:  # else the speed is that at t = 0
+            T /= wp.float64(1.0) + wp.float64(0.5) * dt * springs.lightness[j] * damp[1]
+        for k in range(begin + lane, middle, wp.block_dim()):
+            i = springs.node[k]
+            nodal_force_out[i] = nodal_force_out[i] + springs.weight[k] * T * n
+        wait_for_block()  # points may share nodes
+        for k in range(middle + lane, end, wp.block_dim()):
+            i = springs.node[k]
+            nodal_force_out[i] = nodal_force_out[i] - springs.weight[k] * T * n
+        if keeps and lane == 0:
+            rest = springs.rest[j]
+            lowest = table_at(springs.tables[2 * j], springs.tables[2 * j + 1], springs.x, springs.y, rest)
+            state_out.energy[j] = springs.preload[j] * (e - rest) + stiff[2] - lowest[2]
+            state_out.tension[j] = T
+            state_out.elongation[j] = e
+            count_taken(j, (T - spring) * n, speed, dt, state_out)
+        wait_for_block()  # the next spring may share nodes with this one

@@ -1,0 +1,98 @@
+"""Owns the device side of springs between points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from warp_mca.base.joining import offsets
+from warp_mca.kernels.nodes import spring
+from warp_mca.physics.loads.nodal_stage import NodalLoad
+from warp_mca.step.stage import Step
+
+if TYPE_CHECKING:
+    from warp_mca.step.solver import Solver
+    from warp_mca.step.state import State
+
+BLOCK = 256  # threads of a GPU for the springs of a scene
+
+
+@dataclass(eq=False)
+class SpringsState:
+    """State of springs between points.
+
+    Attributes:
+        energy: stored in each at t(n) [J], shape (count,), float64.
+        taken: by its dashpot up to t(n) [J], shape (count,), float64.
+        tension: T then [N], shape (count,), float64.
+        elongation: L - L_0 then [m], shape (count,), float64.
+        damper: tension of the dashpot along the spring then [N], shape (count,), vec3d.
+        clock: 1 once a spring has taken a step [-], shape (count,), int32.
+    """
+
+    energy: wp.array
+    taken: wp.array
+    tension: wp.array
+    elongation: wp.array
+    damper: wp.array
+    clock: wp.array
+
+
+class SpringsStage(NodalLoad):
+    """All springs between points."""
+
+    def __init__(self, solver: Solver, name: str) -> None:
+        """Allocate on the current device."""
+        super().__init__(solver, name)
+        items, own = self.items, spring.Springs()
+        counts = [n for item in items for n in (item.middle, len(item.node) - item.middle)]
+        own.begin = wp.array(offsets(counts), dtype=wp.int32)
+        own.node = wp.array(np.concatenate([item.node for item in items]), dtype=wp.int32)
+        own.weight = wp.array(np.concatenate([item.weight for item in items]), dtype=wp.float64)
+        for key in ("ground", "direction"):
+            setattr(own, key, wp.array([getattr(item, key) for item in items], dtype=wp.vec3d))
+        for key in ("length", "preload", "rest", "lightness"):
+            setattr(own, key, wp.array([getattr(item, key) for item in items], dtype=wp.float64))
+        tables = [table for item in items for table in (item.table, item.damper)]
+        own.tables = wp.array(offsets([table.shape[1] for table in tables]), dtype=wp.int32)
+        joined = np.concatenate(tables, axis=1)
+        own.x, own.y = wp.array(joined[0], dtype=wp.float64), wp.array(joined[1], dtype=wp.float64)
+        self.springs, self.scenes, self.dt = own, solver.layout.count, solver.common_dt
+        self.lanes = BLOCK if wp.get_device().is_cuda else 1
+
+    def entries(self, item: Any) -> int:
+        """One for each spring."""
+        return 1
+
+    def new_state(self) -> SpringsState:
+        """State before the first step, on the current device."""
+        numbers = {key: wp.zeros(self.count, dtype=wp.float64) for key in ("energy", "taken", "tension", "elongation")}
+        vectors, clock = wp.zeros(self.count, dtype=wp.vec3d), wp.zeros(self.count, dtype=wp.int32)
+        return SpringsState(**numbers, damper=vectors, clock=clock)
+
+    def record_kernels(self) -> list[Any]:
+        """Those of a step, which have blocks of Warp's own size."""
+        return [*super().record_kernels(), spring.pull_springs]
+
+    def push(self, step: Step, start: bool = False) -> None:
+        """Add the forces of all springs."""
+        state, work, kept = step.state, self.work, spring.SpringState()
+        for field in fields(SpringsState):
+            setattr(kept, field.name, getattr(state.parts[self.name], field.name))
+        inputs = [self.first, self.springs, work.X, state.u, state.v, self.dt, not start]
+        threads, outputs = (self.scenes, self.lanes), [work.nodal_force, kept]
+        wp.launch(spring.pull_springs, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK)
+
+    def energies_of(self, state: State) -> Sequence[wp.array]:
+        """Stored, and taken by dashpots."""
+        own = state.parts[self.name]
+        return [own.energy, own.taken]
+
+    def readings_of(self, state: State) -> Sequence[wp.array]:
+        """Tension and elongation."""
+        own = state.parts[self.name]
+        return [own.tension, own.elongation]
