@@ -47,6 +47,7 @@ from warp_mca.scene import (
 )
 from warp_mca.scene.elastic import Elastic
 from warp_mca.scene.metals import Chaboche, CowperSymonds, J2Bilinear, J2Table, J2Voce, JohnsonCook
+from warp_mca.scene.rubbers import MooneyRivlin, NeoHookean, Ogden
 
 if TYPE_CHECKING:
     from warp_mca.accuracy.request import Accuracy
@@ -102,6 +103,9 @@ __all__ = [
     "CowperSymonds",
     "JohnsonCook",
     "Chaboche",
+    "NeoHookean",
+    "MooneyRivlin",
+    "Ogden",
     "library",
     "Contact",
     "ContactAll",

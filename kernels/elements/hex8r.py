@@ -27,7 +27,7 @@ from warp_mca.kernels.elements.readings import energy_kernel as energy_of
 from warp_mca.kernels.elements.readings import stress_kernel as stress_of
 from warp_mca.kernels.elements.viscosity import viscosity_function
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.kernels.materials.kinematics import kinematics
+from warp_mca.kernels.materials.isochoric import law_kinematics
 from warp_mca.kernels.materials.laws import Law, law_functions
 from warp_mca.kernels.materials.point import material_point
 from warp_mca.kernels.records.extremes import keep_functions
@@ -57,7 +57,7 @@ def stress_function(precision: str, law_name: str, finite: bool, viscous: bool =
     lost = point.size + AMPLITUDE_ROWS
     keep_strain, _, _ = keep_functions(R)
     viscous_pressure = viscosity_function(precision, finite, viscous)
-    k = kinematics(precision, finite)
+    k = law_kinematics(precision, law_name, finite)
     dilatation_of, deviator, nominal, pressure_of = k.dilatation, k.deviator, k.nominal, k.pressure
 
     @wp.func

@@ -15,6 +15,7 @@ from warp_mca.kernels.elements.viscosity import viscosity_function
 from warp_mca.kernels.elements.wedge_shape import CORNERS, POINTS, SIXTH, pattern_functions, place_function
 from warp_mca.kernels.elements.wedge_strain import force_function, shape_functions
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.materials.isochoric import law_kinematics
 from warp_mca.kernels.materials.kinematics import kinematics
 from warp_mca.kernels.materials.laws import Law, law_functions
 from warp_mca.kernels.materials.point import material_point
@@ -32,7 +33,7 @@ def kept(law: Law, finite: bool) -> tuple[str, ...]:
 
 def lags(law: Law, finite: bool) -> bool:
     """Whether the internal vector has an inelastic part."""
-    return law.general or bool(law.history)
+    return law.always or bool(law.history)
 
 
 @cache
@@ -57,7 +58,7 @@ def formulation(precision: str, law_name: str, finite: bool) -> Formulation:
         return g
 
     given = (OWN, Wedge6, load_shape, gradient, rotation, 1, corner_of)
-    return Formulation("wedge6", CORNERS, POINTS, *given, enriched=enriched, lags=bool(law_name))
+    return Formulation("wedge6", CORNERS, POINTS, *given, enriched=enriched, lags=lags(law_functions(law_name, precision), finite))
 
 
 @cache
@@ -121,8 +122,10 @@ def force_kernel(precision: str, law_name: str, finite: bool = False, viscous: b
     _, load_shape, enriched, strain_at = shape_functions(precision, law_name, finite)
     gradient, place_of = formulation(precision, law_name, finite).gradient, place_function(precision)
     forces, keep_vector = force_function(precision, law_name, finite), vector_function(precision, law_name, finite)
-    point, k = material_point(precision, law_name, finite), kinematics(precision, finite)
+    point, k = material_point(precision, law_name, finite), law_kinematics(precision, law_name, finite)
     plastic, general, update = bool(law_name), point.general, point.update
+    functions = law_functions(law_name, precision)
+    keeps, always = lags(functions, finite), functions.always
     dilatation_of, deviator, pressure_of, nominal = k.dilatation, k.deviator, k.pressure, k.nominal
     keep_strain, keep_volume, _ = keep_functions(R)
     with_viscosity = viscous_function(precision, law_name, finite, viscous)
@@ -178,9 +181,10 @@ def force_kernel(precision: str, law_name: str, finite: bool = False, viscous: b
                 A = A + strain_at(shape, g) * P
         f, left, loose = forces(shape, law[m, 0], law[m, 1], A, M, Mz, Mr, Ms)
         f = with_viscosity(f, shape, e, dt, extreme_out)
-        if wp.static(plastic):
-            if wp.static(general) or flows != 0:
+        if wp.static(keeps):
+            if wp.static(always) or flows != 0:
                 keep_vector(shape, left, loose, e, history_out, extreme_out)
+        if wp.static(plastic):
             if flows != flag:
                 yielded_out[e] = flows
         keep_strain(e, largest, extreme_out)
