@@ -58,7 +58,9 @@ def formulation(precision: str, law_name: str, finite: bool) -> Formulation:
         return g
 
     given = (OWN, Wedge6, load_shape, gradient, rotation, 1, corner_of)
-    return Formulation("wedge6", CORNERS, POINTS, *given, enriched=enriched, lags=lags(law_functions(law_name, precision), finite))
+    return Formulation(
+        "wedge6", CORNERS, POINTS, *given, enriched=enriched, lags=lags(law_functions(law_name, precision), finite)
+    )
 
 
 @cache

@@ -38,9 +38,7 @@ _STEP = "x = x * (({real})(4.0 / 3.0) - third * x * x * x);"
 @cache
 def root_function(precision: str) -> Any:
     """The function y -> y^(-1/3) of a positive number, near rounding; NaN for others on a CPU."""
-    R, real, suffix, steps = (
-        (wp.float32, "float", "f", 3) if precision == "mixed" else (wp.float64, "double", "", 5)
-    )
+    R, real, suffix, steps = (wp.float32, "float", "f", 3) if precision == "mixed" else (wp.float64, "double", "", 5)
     source = _SOURCE.format(real=real, suffix=suffix, steps=steps * _STEP.format(real=real))
 
     @wp.func_native(source)

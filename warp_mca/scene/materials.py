@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from warp_mca.scene.elastic import Elastic, check_law
+from warp_mca.scene.foams import CrushableFoam
 from warp_mca.scene.metals import Chaboche, CowperSymonds, J2Bilinear, J2Table, J2Voce, JohnsonCook
 from warp_mca.scene.rubbers import MooneyRivlin, NeoHookean, Ogden
+from warp_mca.scene.viscoelastic import Prony
 
 __all__ = ["MATERIALS", "Elastic", "J2Bilinear", "Material", "check_law"]
 
@@ -13,5 +15,5 @@ Material = Elastic  # for annotations: every material is elastic below yield
 MATERIALS: dict[str, type[Material]] = {
     kind.__name__: kind
     for kind in (Elastic, J2Bilinear, J2Voce, J2Table, CowperSymonds, JohnsonCook, Chaboche)
-    + (NeoHookean, MooneyRivlin, Ogden)
+    + (NeoHookean, MooneyRivlin, Ogden, Prony, CrushableFoam)
 }

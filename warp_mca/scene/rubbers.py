@@ -146,7 +146,9 @@ class Ogden(Hyperelastic):
             raise bad_value("Ogden.alpha", self.alpha, f"give as many exponents as mu has, {len(self.mu)}")
         for mu, alpha in zip(self.mu, self.alpha, strict=True):
             if not mu * alpha > 0.0:
-                raise bad_value("Ogden.alpha", self.alpha, f"give each the sign of its mu, as mu alpha = {mu * alpha:g}")
+                raise bad_value(
+                    "Ogden.alpha", self.alpha, f"give each the sign of its mu, as mu alpha = {mu * alpha:g}"
+                )
 
     @property
     def law(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
