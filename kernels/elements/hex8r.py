@@ -11,6 +11,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.base.errors import bad_value
 from warp_mca.kernels.elements.formulation import OWN, Formulation
 from warp_mca.kernels.elements.hexahedron import load_function, store_function
 from warp_mca.kernels.elements.hourglass import AMPLITUDE_ROWS, KEPT, amplitude_functions, hourglass_function
@@ -47,7 +48,13 @@ def stress_function(precision: str, law_name: str, finite: bool, viscous: bool =
     """The function that gives stress and hourglass forces of an element, with plastic flow; it keeps the strain.
 
     A larger function, or a matrix that changes within a branch, would prevent vectorisation on a CPU.
+
+    Raises:
+        RequestError: the law relaxes, which the hourglass stiffness does not.
     """
+    if law_functions(law_name, precision).relaxes:
+        remedy = "its hourglass stiffness does not relax as the material does; choose hex8i or hex8"
+        raise bad_value("Body.element", "hex8r", remedy)
     t = scalars(precision)
     R, mat33, mat43, mat73 = t.real, t.mat33, t.mat43, t.mat73
     hourglass = hourglass_function(precision)

@@ -96,7 +96,8 @@ def vector_function(precision: str, law_name: str, finite: bool) -> Any:
     """
     R, vec3 = scalars(precision).real, scalars(precision).vec3
     Wedge6, _, _, _ = shape_functions(precision, law_name, finite)
-    first = POINTS * law_functions(law_name, precision).size
+    law = law_functions(law_name, precision)
+    always, first = law.always, POINTS * law.size
 
     @wp.func
     def keep_vector(
@@ -104,14 +105,16 @@ def vector_function(precision: str, law_name: str, finite: bool) -> Any:
         left: vec3,
         loose: vec3,
         e: int,
+        flows: int,
         history_out: wp.array2d(dtype=R),
         extreme_out: wp.array2d(dtype=R),
     ):
-        change = R(0.5) * (shape.G * loose)
-        for i in range(3):
-            history_out[wp.static(first) + i, e] = history_out[wp.static(first) + i, e] - change[i]
-        work = R(0.5) * R(SIXTH) * shape.volume * wp.dot(left, loose)
-        extreme_out[LAG_LOSS, e] = extreme_out[LAG_LOSS, e] + work
+        if wp.static(always) or flows != 0:
+            change = R(0.5) * (shape.G * loose)
+            for i in range(3):
+                history_out[wp.static(first) + i, e] = history_out[wp.static(first) + i, e] - change[i]
+            work = R(0.5) * R(SIXTH) * shape.volume * wp.dot(left, loose)
+            extreme_out[LAG_LOSS, e] = extreme_out[LAG_LOSS, e] + work
 
     return keep_vector
 
@@ -126,8 +129,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False, viscous: b
     forces, keep_vector = force_function(precision, law_name, finite), vector_function(precision, law_name, finite)
     point, k = material_point(precision, law_name, finite), law_kinematics(precision, law_name, finite)
     plastic, general, update = bool(law_name), point.general, point.update
-    functions = law_functions(law_name, precision)
-    keeps, always = lags(functions, finite), functions.always
+    keeps = lags(law_functions(law_name, precision), finite)
     dilatation_of, deviator, pressure_of, nominal = k.dilatation, k.deviator, k.pressure, k.nominal
     keep_strain, keep_volume, _ = keep_functions(R)
     with_viscosity = viscous_function(precision, law_name, finite, viscous)
@@ -184,8 +186,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False, viscous: b
         f, left, loose = forces(shape, law[m, 0], law[m, 1], A, M, Mz, Mr, Ms)
         f = with_viscosity(f, shape, e, dt, extreme_out)
         if wp.static(keeps):
-            if wp.static(always) or flows != 0:
-                keep_vector(shape, left, loose, e, history_out, extreme_out)
+            keep_vector(shape, left, loose, e, flows, history_out, extreme_out)
         if wp.static(plastic):
             if flows != flag:
                 yielded_out[e] = flows

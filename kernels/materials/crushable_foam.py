@@ -43,7 +43,7 @@ def parameters(precision: str) -> Any:
 def strain_function(precision: str) -> Any:
     """The function history -> eps_p."""
     t = scalars(precision)
-    R, mat33, rows = t.real, t.mat33, wp.types.vector(9, t.real)
+    mat33, rows = t.mat33, wp.types.vector(9, t.real)
 
     @wp.func
     def inelastic_strain(h: rows):
@@ -112,7 +112,7 @@ def stress(precision: str) -> Any:
 def energies(precision: str) -> Any:
     """The function (strain, history, c) -> (stored, dissipated) [J/m^3]."""
     t, Table = scalars(precision), table_type(precision)
-    R, mat33, rows, inelastic = t.real, t.mat33, wp.types.vector(9, t.real), strain_function(precision)
+    mat33, rows, inelastic = t.mat33, wp.types.vector(9, t.real), strain_function(precision)
 
     @wp.func
     def foam_energies(strain: mat33, h: rows, c: Table):

@@ -60,7 +60,7 @@ class Law:
             strain of the isochoric deformation, (J^(-2/3) F^T F - I) / 2: the deviator of the Kirchhoff stress before
             the rotation. For finite strain only.
         stored: of a hyperelastic law: (strain, c) -> energy without that of the pressure.
-        deviatoric: of a viscous law: (strain, history, dt, c) -> (S, history), of the deviatoric strain that flow takes.
+        deviatoric: of a viscous law: (strain, history, dt, c) -> (S, history), of the deviatoric strain.
         stress: of a general law: (strain, history, dt, c) -> (stress, history). The strain is measured in the axes of
             the reference, which have turned with the element where strains are small, and is logarithmic where
             `Body.kinematics` is finite; the stress is the one conjugate to it. The history is a vector of the law's
@@ -70,8 +70,9 @@ class Law:
             `stress` or `deviatoric` gave; of a viscous law without the energy of the pressure.
         history: kinds of what each point keeps, out of `ROWS`; HISTORY of the module of a rated, viscous or general
             law. That of a rated law begins with `FLOW_HISTORY`.
-        elliptic: whether its elasticity stays so at large strain, which logarithmic elasticity does not. Of a viscous law
-            a function `elliptic` of its module says so.
+        elliptic: whether its elasticity stays so at large strain, which logarithmic elasticity does not. A function
+            `elliptic` of the module of a viscous law says so.
+        relaxes: whether stress falls at a constant strain; RELAXES of the module.
         plastic_row: of the equivalent plastic strain in the history, which must not shrink; PLASTIC_ROW of a general
             law, -1 where it has none.
     """
@@ -88,6 +89,7 @@ class Law:
     energies: Any = None
     history: tuple[str, ...] = ()
     elliptic: bool = False
+    relaxes: bool = False
     plastic_row: int = -1
 
     @property
@@ -154,7 +156,8 @@ def law_functions(name: str, precision: str) -> Law:
         remedy = " or ".join(", ".join(names) for names in FAMILIES.values())
         remedy = f"name a module that makes {remedy}: {type(error).__name__}: {error}"
         raise bad_value("law of a material", name, remedy) from error
-    return Law(**made, history=history, elliptic=elliptic, plastic_row=row)
+    facts = {"history": history, "elliptic": elliptic, "plastic_row": row}
+    return Law(**made, **facts, relaxes=getattr(module, "RELAXES", False))
 
 
 def _history(module: ModuleType, key: str, given: list[str]) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Owns Ogden's law: the sum of mu_p / alpha_p (l1^alpha_p + l2^alpha_p + l3^alpha_p - 3) of the isochoric stretches l_i.
+"""Owns Ogden's law: sum of mu_p / alpha_p (l1^alpha_p + l2^alpha_p + l3^alpha_p - 3), of isochoric stretches l_i.
 
 Ogden, Proc. R. Soc. A 326 (1972) 565. The name of the law ends with the number of its terms.
 """

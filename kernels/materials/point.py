@@ -27,8 +27,9 @@ class MaterialPoint:
         size: rows of the history of a point; none where nothing is kept.
         general: whether the law gives the pressure too, which is 0 below otherwise.
         update: (strain, theta, G, g, e, m, flag, law, dt, history_out) -> (S, pressure, dp) of point g: the deviatoric
-            stress conjugate to the deviatoric `strain` (Mandel's of hyperelastic laws, see `isochoric`), the pressure conjugate to J = 1 + theta, both in Pa, and the
-            growth of the equivalent plastic strain. The history is kept; `flag` says whether there is any yet.
+            stress conjugate to the deviatoric `strain` (Mandel's of hyperelastic laws, see `isochoric`), the pressure
+            conjugate to J = 1 + theta, both in Pa, and the growth of the equivalent plastic strain. The history is
+            kept; `flag` says whether there is any yet.
         read: (strain, theta, G, g, e, m, flag, law, history) -> (S, pressure, p, stored, dissipated) of the history as
             it stands; energies [J/m^3], without that of the pressure where the law is not general.
     """

@@ -5,8 +5,9 @@ has relaxed. For T linear over a step dt, with h = g T - z and x = dt / tau, exa
 
     z <- z + (1 - e^-x) h + g (1 - (1 - e^-x) / x) (T_new - T)
 
-Taylor, Pister and Goudreau, Int. J. Numer. Meth. Engng 2 (1970) 45; Simo and Hughes, Computational Inelasticity (1998),
-section 10.3. z grows from 0, so that float32 resolves slow terms. At finite strain T is conjugate to logarithmic strain.
+Taylor, Pister and Goudreau, Int. J. Numer. Meth. Engng 2 (1970) 45; Simo and Hughes, Computational Inelasticity
+(1998), section 10.3. z grows from 0, so that float32 resolves slow terms. At finite strain T is the stress conjugate to
+logarithmic strain.
 
 The dissipated energy grows by (h + h_new) : dz C / (2 g), with the compliance C = 1 / (2 G) of elasticity, and the
 secant one 2 W / (T : T) of a hyperelastic energy W, with which a step that relaxes takes the share g of W. The rest of
@@ -24,11 +25,12 @@ from warp_mca.kernels.materials.laws import law_functions, row_count
 
 wp.set_module_options({"enable_backward": False})
 
+RELAXES = True
 FIRST = 9  # column of Model.law with g of the first term; g of all terms, then tau [s], then k of the bulk modulus
 SMALL = 1e-4  # stress over G below which the compliance is that of small strain
 
 
-def HISTORY(terms: str, *base: str) -> tuple[str, ...]:  # noqa: N802 (as the constant of other laws)
+def HISTORY(terms: str, *base: str) -> tuple[str, ...]:  # in capitals as the constant of other laws
     """z of each term, T and the dissipated energy; strain and work of a hyperelastic law."""
     return ("deviator",) * (int(terms) + 1) + ("scalar",) + ("deviator", "scalar") * _nonlinear(base)
 

@@ -16,9 +16,10 @@ wp.set_module_options({"enable_backward": False})
 
 parameters = prony.parameters
 elliptic = prony.elliptic
+RELAXES = True
 
 
-def HISTORY(terms: str, *base: str) -> tuple[str, ...]:  # noqa: N802 (as the constant of other laws)
+def HISTORY(terms: str, *base: str) -> tuple[str, ...]:  # in capitals as the constant of other laws
     """That of `prony`; z of each term, and K tr(strain)."""
     return prony.HISTORY(terms, *base) + ("scalar",) * (int(terms) + 1)
 

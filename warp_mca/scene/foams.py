@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import ClassVar
 
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
@@ -24,17 +23,18 @@ class CrushableFoam(Elastic):
         stress: stress of each point [Pa], above 0, not falling; the last one holds beyond.
         tension: greatest principal stress in tension [Pa].
         nu: 0.
-        least_stretch: smallest principal stretch that the stable step allows for [-], in (0, 1]. Beyond, the balance of
+        least_stretch: smallest principal stretch that the stable step allows for [-], in [0.01, 1]. Beyond, the balance of
             energy tells.
     """
 
+    E: float
     nu: float = field(init=False, default=0.0)
     crush: tuple[float, ...]
     stress: tuple[float, ...]
     tension: float
     least_stretch: float = 0.25
     law = "warp_mca.kernels.materials.crushable_foam"
-    finite_only: ClassVar[bool] = True
+    finite_only = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -54,8 +54,8 @@ class CrushableFoam(Elastic):
         slope = max(((t - s) / (b - a) for (a, s), (b, t) in pairwise(points)), default=0.0)
         if slope >= self.E:
             raise bad_value(f"{kind}.E", self.E, f"give more than the steepest slope of the curve, {slope:.4g} Pa")
-        if not (validate.is_number(self.least_stretch) and 0.0 < self.least_stretch <= 1.0):
-            raise bad_value(f"{kind}.least_stretch", self.least_stretch, "give a stretch above 0, 1 at most")
+        if not (validate.is_number(self.least_stretch) and 0.01 <= self.least_stretch <= 1.0):
+            raise bad_value(f"{kind}.least_stretch", self.least_stretch, "give a stretch from 0.01 to 1")
 
     @property
     def bulk_modulus(self) -> float:

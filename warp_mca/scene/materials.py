@@ -12,8 +12,6 @@ __all__ = ["MATERIALS", "Elastic", "J2Bilinear", "Material", "check_law"]
 
 Material = Elastic  # for annotations: every material is elastic below yield
 
-MATERIALS: dict[str, type[Material]] = {
-    kind.__name__: kind
-    for kind in (Elastic, J2Bilinear, J2Voce, J2Table, CowperSymonds, JohnsonCook, Chaboche)
-    + (NeoHookean, MooneyRivlin, Ogden, Prony, CrushableFoam)
-}
+_METALS = (J2Bilinear, J2Voce, J2Table, CowperSymonds, JohnsonCook, Chaboche)
+_SOFT = (NeoHookean, MooneyRivlin, Ogden, Prony, CrushableFoam)
+MATERIALS: dict[str, type[Material]] = {kind.__name__: kind for kind in (Elastic, *_METALS, *_SOFT)}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar
 
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
@@ -18,22 +17,22 @@ class Hyperelastic(Elastic):
         nu: Poisson's ratio at small strain [-], in (-1, 0.5), from which the bulk modulus K follows. Take 0.49 to 0.499
             for rubber: waves of pressure set the stable step, which falls as sqrt(1 - 2 nu).
         E: Young's modulus at small strain [Pa], which follows from the law.
-        least_stretch: smallest principal stretch that the stable step allows for [-], in (0, 1]: 0.7 is the width of a
+        least_stretch: smallest principal stretch that the stable step allows for [-], in [0.01, 1]: 0.7 is the width of a
             strip at twice its length, or a block at 0.7 of its height. Beyond, the balance of energy tells.
     """
 
     E: float = field(init=False)
     nu: float = 0.495
     least_stretch: float = 0.7
-    finite_only: ClassVar[bool] = True
+    finite_only = True
 
     def __post_init__(self) -> None:
         kind = type(self).__name__
         self._check()
         if not (validate.is_number(self.nu) and -1.0 < self.nu < 0.5):
             raise bad_value(f"{kind}.nu", self.nu, "Poisson's ratio must lie in (-1, 0.5)")
-        if not (validate.is_number(self.least_stretch) and 0.0 < self.least_stretch <= 1.0):
-            raise bad_value(f"{kind}.least_stretch", self.least_stretch, "give a stretch above 0, 1 at most")
+        if not (validate.is_number(self.least_stretch) and 0.01 <= self.least_stretch <= 1.0):
+            raise bad_value(f"{kind}.least_stretch", self.least_stretch, "give a stretch from 0.01 to 1")
         object.__setattr__(self, "E", 2.0 * self.initial_shear_modulus * (1.0 + self.nu))
         super().__post_init__()
 

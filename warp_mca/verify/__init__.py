@@ -23,6 +23,7 @@ FILES = (
     "material",
     "large_strain",
     "metals",
+    "rubber",
     "waves",
     "absorbing",
     "tied",

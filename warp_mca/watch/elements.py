@@ -38,6 +38,24 @@ def scattered_pressure(c: Context, most: float) -> Iterator[Values]:
 
 
 @row(
+    "{element} is some percent too stiff in rubber at large strain, and loses energy near nu = 0.5; body {body} has "
+    "nu = {nu:.4g}:",
+    "take element='hex8', whose pressure is one for each cell",
+    0.48,
+    "Poisson's ratio at most, of materials for large strain only",
+    kind=Kind.ADVICE,
+    when=When.BEFORE,
+)
+def enriched_rubber(c: Context, most: float) -> Iterator[Values]:
+    """Poisson's ratio of rubber in bodies of hexahedra with internal modes."""
+    for body in c.scene.bodies:
+        materials = [material for material, _ in body_materials(body, c.meshes[body.name]) if material.finite_only]
+        nu = max((material.nu for material in materials), default=0.0)
+        if body.element in ("hex8i", "hex8w", "hex8w3") and not body.rigid and nu > most:
+            yield dict(body=body.name, element=body.element, nu=nu)
+
+
+@row(
     "tet10_mean bends too far in walls of one layer of elements, as {share:.0%} of body {body} seems to be:",
     "take tet10 there, or smaller cells",
     0.5,
