@@ -73,4 +73,25 @@ ELEMENT_MUTATIONS: dict[str, Mutation] = {
         "Y1 = (X1",
         element="tet4",
     ),
+    "relaxation_halved": Mutation(
+        "what relaxes of a Prony series in a step is half of it",
+        "kernels/materials/prony.py",
+        "dz = gone * left",
+        "dz = R(0.5) * gone * left",
+        element="hex8",
+    ),
+    "second_invariant_low": Mutation(
+        "the law of Mooney and Rivlin lacks a part of its second modulus",
+        "kernels/materials/mooney_rivlin.py",
+        "c[1] * (R(1.0) + wp.trace(B))",
+        "c[1] * wp.trace(B)",
+        element="tet4",
+    ),
+    "foam_crushed_half": Mutation(
+        "the curve of foam is read at half of its crushing",
+        "kernels/materials/crushable_foam.py",
+        "curve(crushed, c)",
+        "curve(R(0.5) * crushed, c)",
+        element="hex8",
+    ),
 }

@@ -23,8 +23,8 @@ class CrushableFoam(Elastic):
         stress: stress of each point [Pa], above 0, not falling; the last one holds beyond.
         tension: greatest principal stress in tension [Pa].
         nu: 0.
-        least_stretch: smallest principal stretch that the stable step allows for [-], in [0.01, 1]. Beyond, the balance of
-            energy tells.
+        least_stretch: smallest principal stretch that the stable step allows for [-], in [0.01, 1]. Beyond, the balance
+            of energy tells.
     """
 
     E: float

@@ -17,8 +17,8 @@ class Hyperelastic(Elastic):
         nu: Poisson's ratio at small strain [-], in (-1, 0.5), from which the bulk modulus K follows. Take 0.49 to 0.499
             for rubber: waves of pressure set the stable step, which falls as sqrt(1 - 2 nu).
         E: Young's modulus at small strain [Pa], which follows from the law.
-        least_stretch: smallest principal stretch that the stable step allows for [-], in [0.01, 1]: 0.7 is the width of a
-            strip at twice its length, or a block at 0.7 of its height. Beyond, the balance of energy tells.
+        least_stretch: smallest principal stretch that the stable step allows for [-], in [0.01, 1]: 0.7 is the width of
+            a strip at twice its length, or a block at 0.7 of its height. Beyond, the balance of energy tells.
     """
 
     E: float = field(init=False)

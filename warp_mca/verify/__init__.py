@@ -29,6 +29,7 @@ FILES = (
     "tied",
     "bending",
     "impact",
+    "viscoelastic_ball",
     "taylor",
     "rates",
     "friction",
