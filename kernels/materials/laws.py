@@ -170,7 +170,8 @@ def _history(module: ModuleType, key: str, given: list[str]) -> tuple[str, ...]:
         return ()
     if key == "return_map":
         return FLOW_HISTORY
-    history = tuple(module.HISTORY(*given) if callable(module.HISTORY) else module.HISTORY)
+    kinds: Any = module.HISTORY
+    history = tuple(kinds(*given) if callable(kinds) else kinds)
     if key == "flow" and history[:2] != FLOW_HISTORY:
         raise ValueError(f"HISTORY = {history} of a rated law begins with {', '.join(FLOW_HISTORY)}")
     return history

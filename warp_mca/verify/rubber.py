@@ -39,7 +39,8 @@ def deviator_of(rubber: mca.Elastic, e: Array) -> Array:
     log, axes = np.linalg.eigh(e)
     stretch = np.exp(log)
     if isinstance(rubber, mca.Ogden):
-        value = sum(mu * stretch**alpha for mu, alpha in zip(rubber.mu, rubber.alpha, strict=True))
+        terms = [mu * stretch**alpha for mu, alpha in zip(rubber.mu, rubber.alpha, strict=True)]
+        value = np.sum(terms, axis=0)
     else:
         value = 2.0 * rubber.C10 * stretch**2 - 2.0 * getattr(rubber, "C01", 0.0) * stretch**-2.0
     value = value - value.mean(axis=1, keepdims=True)

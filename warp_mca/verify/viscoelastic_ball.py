@@ -25,10 +25,10 @@ def contact_force(duration: float, steps: int) -> tuple[Array, Array]:
     mass, dt = 4.0 / 3.0 * math.pi * RADIUS**3 * RHO, duration / steps
     time = dt * np.arange(steps)
     middle = time + 0.5 * dt
-    relaxing = 1.0 - sum(g * (1.0 - np.exp(-middle / tau)) for g, tau in zip(G, TAU, strict=True))
+    relaxing = 1.0 - np.sum([g * (1.0 - np.exp(-middle / tau)) for g, tau in zip(G, TAU, strict=True)], axis=0)
     modulus = E / (1.0 - NU**2) * relaxing  # by the time from the middle of a step to a later step's end
     delta, power, force = np.zeros(steps), np.zeros(steps), np.zeros(steps)
-    v, top = SPEED, 0
+    v, top, steps_back = SPEED, 0, np.zeros(0)
     for n in range(1, steps):
         delta[n] = delta[n - 1] + dt * v
         power[n] = max(delta[n], 0.0) ** 1.5
