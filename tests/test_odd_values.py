@@ -19,6 +19,7 @@ from warp_mca.scene import materials
 from warp_mca.scene.joints import Joint
 from warp_mca.scene.loads import Load
 from warp_mca.verify.metals import METALS
+from warp_mca.verify.rubber import FOAM, RUBBERS, VISCOUS
 
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
 METAL = mca.J2Bilinear(E=210e9, nu=0.3, rho=7850.0, sigma_y=4e8, E_t=1e9, beta=0.5)
@@ -30,6 +31,7 @@ SOUND: dict[type, Any] = {
     mca.Elastic: STEEL,
     mca.J2Bilinear: METAL,
     **{type(metal): metal for metal in METALS.values()},
+    **{type(item): item for item in (*RUBBERS.values(), VISCOUS["elastic"], FOAM)},
     mca.Box: mca.Box(size=(0.01, 0.01, 0.01), divisions=(1, 1, 1)),
     mca.Rod: mca.Rod(radius=0.01, length=0.05, section=2, ring=1, axial=2, tip_layers=1, focus_layers=1),
     mca.LugRod: mca.LugRod(radius=0.01, length=0.06, section=4, ring=1, axial=2, tip_layers=1, focus_layers=1),
@@ -175,7 +177,10 @@ def scene_with(item: Any) -> mca.Scene:
             loads = {name: (item,) if name == "torques" else item}
             return scene_with(dataclasses.replace(SOUND[mca.RigidPhase], **loads))
         case mca.Elastic():
-            change = {"bodies": (dataclasses.replace(low, material=item), up)}
+            own: dict[str, Any] = {"kinematics": "finite"} if item.finite_only else {}
+            if type(item) in (mca.NeoHookean, mca.MooneyRivlin, mca.Ogden, mca.Prony, mca.CrushableFoam):
+                own["element"] = "hex8r" if isinstance(item, mca.CrushableFoam) else "tet4"  # which compile sooner
+            change = {"bodies": (dataclasses.replace(low, material=item, **own), up)}
         case mca.Part():
             change = {"bodies": (dataclasses.replace(low, geometry=mca.Parts(parts=(item,))), up)}
         case mca.Box() | mca.Rod() | mca.Sphere() | mca.Plate() | mca.NestedPlate() | mca.Parts():
@@ -236,6 +241,7 @@ def fields() -> list[Any]:
         pytest.param(kind, field.name, id=f"{kind.__name__}.{field.name}")
         for kind in SOUND
         for field in dataclasses.fields(kind)
+        if field.init
     ]
 
 

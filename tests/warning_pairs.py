@@ -126,6 +126,14 @@ def _(beyond: bool) -> list[str]:
     return told_of(elements.scattered_pressure, replace(scene, bodies=(body,)))
 
 
+@pair(elements.enriched_rubber)
+def _(beyond: bool) -> list[str]:
+    scene = alone(cube(2))
+    rubber = mca.NeoHookean(C10=1e6, nu=0.481 if beyond else 0.479, rho=1000.0)
+    body = replace(scene.bodies[0], material=rubber, kinematics="finite")
+    return told_of(elements.enriched_rubber, replace(scene, bodies=(body,)))
+
+
 @pair(elements.single_layer)
 def _(beyond: bool) -> list[str]:
     plate = mca.Box(size=(0.06, 0.06, 0.01), divisions=(6, 6, 1 if beyond else 2))

@@ -55,7 +55,10 @@ from warp_mca.scene import (
     library,
 )
 from warp_mca.scene.elastic import Elastic
+from warp_mca.scene.foams import CrushableFoam
 from warp_mca.scene.metals import Chaboche, CowperSymonds, J2Bilinear, J2Table, J2Voce, JohnsonCook
+from warp_mca.scene.rubbers import MooneyRivlin, NeoHookean, Ogden
+from warp_mca.scene.viscoelastic import Prony
 
 if TYPE_CHECKING:
     from warp_mca.accuracy.request import Accuracy
@@ -111,6 +114,11 @@ __all__ = [
     "CowperSymonds",
     "JohnsonCook",
     "Chaboche",
+    "NeoHookean",
+    "MooneyRivlin",
+    "Ogden",
+    "Prony",
+    "CrushableFoam",
     "library",
     "Contact",
     "ContactAll",

@@ -73,4 +73,25 @@ ELEMENT_MUTATIONS: dict[str, Mutation] = {
         "Y1 = (X1",
         element="tet4",
     ),
+    "relaxation_halved": Mutation(
+        "what relaxes of a Prony series in a step is half of it",
+        "kernels/materials/prony.py",
+        "dz = gone * left",
+        "dz = R(0.5) * gone * left",
+        element="hex8",
+    ),
+    "second_invariant_low": Mutation(
+        "the second modulus of Mooney and Rivlin's law is too low",
+        "kernels/materials/mooney_rivlin.py",
+        "pair(law[m, 3], law[m, 4])",
+        "pair(law[m, 3], R(0.9) * law[m, 4])",
+        element="tet4",
+    ),
+    "foam_crushed_half": Mutation(
+        "the curve of foam is read at half of its crushing",
+        "kernels/materials/crushable_foam.py",
+        "curve(crushed, c)",
+        "curve(R(0.5) * crushed, c)",
+        element="hex8",
+    ),
 }

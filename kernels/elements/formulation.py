@@ -13,7 +13,7 @@ import warp as wp
 
 from warp_mca.base.errors import bad_value
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.kernels.materials.kinematics import kinematics
+from warp_mca.kernels.materials.isochoric import law_kinematics
 from warp_mca.kernels.materials.point import material_point
 from warp_mca.kernels.records.extremes import keep_functions
 
@@ -120,7 +120,7 @@ def force_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fal
     t = scalars(precision)
     R, vec3, forces = t.real, t.vec3, wp.types.matrix((corners, 3), t.real)
     keep_strain, keep_volume, _ = keep_functions(R)
-    k = kinematics(precision, finite)
+    k = law_kinematics(precision, law_name, finite)
     dilatation_of, deviator, pressure_of, nominal = k.dilatation, k.deviator, k.pressure, k.nominal
 
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False)

@@ -17,6 +17,7 @@ from warp_mca.kernels.elements.hexahedron import (
 )
 from warp_mca.kernels.elements.viscosity import viscosity_function
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.materials.isochoric import law_kinematics
 from warp_mca.kernels.materials.kinematics import kinematics
 from warp_mca.kernels.materials.point import material_point
 from warp_mca.kernels.records.extremes import keep_functions
@@ -77,7 +78,7 @@ def points_force_kernel(precision: str, law_name: str, finite: bool, viscous: in
     point_gradient = gradient_function(precision)
     point = material_point(precision, law_name, finite, points=8)
     plastic, general, update = bool(law_name), point.general, point.update
-    k = kinematics(precision, finite)
+    k = law_kinematics(precision, law_name, finite)
     deviator, nominal, pressure_of = k.deviator, k.nominal, k.pressure
     mean_dilatation, pressure_lines = shared_functions(precision, finite)
     viscous_pressure = viscosity_function(precision, finite, viscous)

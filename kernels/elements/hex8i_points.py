@@ -21,7 +21,7 @@ from warp_mca.kernels.elements.hex8i_small import internal_function
 from warp_mca.kernels.elements.hex8i_vectors import closed_form_function, corrected_function, vector_functions
 from warp_mca.kernels.elements.internal_modes import mode_functions, place_functions
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.kernels.materials.kinematics import kinematics
+from warp_mca.kernels.materials.isochoric import law_kinematics
 from warp_mca.kernels.materials.point import material_point
 
 wp.set_module_options({"enable_backward": False})
@@ -84,7 +84,7 @@ def sums_function(precision: str, law_name: str, finite: bool, points: int) -> A
     column_place, layer_place, layer_count = *place_functions(precision, points), points // 4
     point = material_point(precision, law_name, finite, points)
     general, update = point.general, point.update
-    k = kinematics(precision, finite)
+    k = law_kinematics(precision, law_name, finite)
     dilatation_of, deviator, pressure_of, nominal = k.dilatation, k.deviator, k.pressure, k.nominal
 
     @wp.func

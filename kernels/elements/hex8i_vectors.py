@@ -23,6 +23,7 @@ FADING, FADED = 0.2, 0.35  # |e| of the elastic deviatoric strain e from which v
 # F : F / J^(2/3) of the mean deformation from which vectors are held more and more, up to HELD: cells that are crushed
 # to a fifth and to a tenth of their height
 HOLDING, HELD = 10.0, 20.0
+STIFFENING = 2.0  # greatest growth of tangent moduli over that of the deviatoric stress
 LOOSE = 1e-3  # share of its motion that a held vector keeps, so that its closed form is known
 
 KEPT = ("vector", "vector", "vector", "scalar")  # c_k, and how far vectors have faded, behind the history of the points
@@ -55,7 +56,8 @@ def vector_functions(precision: str, law_name: str, points: int) -> tuple[Any, A
 def share_function(precision: str, law_name: str, finite: bool) -> Any:
     """The function (F, greatest S : S of a point, G) -> the share [-] that is left of vectors, or of their motion."""
     R, mat33 = scalars(precision).real, scalars(precision).mat33
-    holds, fades = finite and bool(law_name), finite and not law_functions(law_name, precision).general
+    law = law_functions(law_name, precision)
+    holds, fades = finite and law.flows, finite and not law.elliptic
     per_strain, per_stretch = 1.0 / (FADED - FADING), 1.0 / (HELD - HOLDING)
 
     @wp.func
@@ -76,15 +78,18 @@ def share_function(precision: str, law_name: str, finite: bool) -> Any:
 def corrected_function(precision: str, law_name: str, finite: bool) -> Any:
     """The function (F, c, a, A_k^-1 F r_k in rows, share, greatest S : S, G) -> change of a, new c, new share."""
     R, mat33 = scalars(precision).real, scalars(precision).mat33
-    share_left, plastic = share_function(precision, law_name, finite), bool(law_name)
+    law, share_left = law_functions(law_name, precision), share_function(precision, law_name, finite)
+    flows, stiffens = law.flows, finite and law.elliptic and not law.general
 
     @wp.func
     def corrected(F: mat33, c: mat33, a: mat33, s: mat33, share: R, stress2: R, G: R):
         left = share_left(F, stress2, G)
         step = R(-3.0) * (s * F)
+        if wp.static(stiffens):  # where the tangent moduli exceed those of A_k, whole steps would go too far
+            step = (G / (G + R(STIFFENING) * wp.sqrt(stress2))) * step
         closed = (R(1.0) / wp.max(share, R(LEAST))) * (a - c)
         new = mat33()
-        if wp.static(plastic):
+        if wp.static(flows):
             new = c + (left * step + (share - left) * closed)
         else:
             new = left * (c + step)

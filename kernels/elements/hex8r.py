@@ -11,6 +11,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.base.errors import bad_value
 from warp_mca.kernels.elements.formulation import OWN, Formulation
 from warp_mca.kernels.elements.hexahedron import load_function, store_function
 from warp_mca.kernels.elements.hourglass import AMPLITUDE_ROWS, KEPT, amplitude_functions, hourglass_function
@@ -27,7 +28,7 @@ from warp_mca.kernels.elements.readings import energy_kernel as energy_of
 from warp_mca.kernels.elements.readings import stress_kernel as stress_of
 from warp_mca.kernels.elements.viscosity import viscosity_function
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.kernels.materials.kinematics import kinematics
+from warp_mca.kernels.materials.isochoric import law_kinematics
 from warp_mca.kernels.materials.laws import Law, law_functions
 from warp_mca.kernels.materials.point import material_point
 from warp_mca.kernels.records.extremes import keep_functions
@@ -47,7 +48,13 @@ def stress_function(precision: str, law_name: str, finite: bool, viscous: int = 
     """The function that gives stress and hourglass forces of an element, with plastic flow; it keeps the strain.
 
     A larger function, or a matrix that changes within a branch, would prevent vectorisation on a CPU.
+
+    Raises:
+        RequestError: the law relaxes, which the hourglass stiffness does not.
     """
+    if law_functions(law_name, precision).relaxes:
+        remedy = "its hourglass stiffness does not relax as the material does; choose hex8i or hex8"
+        raise bad_value("Body.element", "hex8r", remedy)
     t = scalars(precision)
     R, mat33, mat43, mat73 = t.real, t.mat33, t.mat43, t.mat73
     hourglass = hourglass_function(precision)
@@ -57,7 +64,7 @@ def stress_function(precision: str, law_name: str, finite: bool, viscous: int = 
     lost = point.size + AMPLITUDE_ROWS
     keep_strain, _, _ = keep_functions(R)
     viscous_pressure = viscosity_function(precision, finite, viscous)
-    k = kinematics(precision, finite)
+    k = law_kinematics(precision, law_name, finite)
     dilatation_of, deviator, nominal, pressure_of = k.dilatation, k.deviator, k.nominal, k.pressure
 
     @wp.func

@@ -8,6 +8,7 @@ import warp as wp
 from warp_mca.kernels.elements.formulation import MEAN, NODAL, OWN, Maker, load_function, parts_of
 from warp_mca.kernels.elements.viscosity import THERMAL
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.materials.isochoric import law_kinematics
 from warp_mca.kernels.materials.kinematics import kinematics
 from warp_mca.kernels.records.extremes import LAG_LOSS, STRAIN_SQUARE, VOLUME_LOSS
 
@@ -92,7 +93,7 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
     plastic, general, read = bool(law_name), point.general, point.read
     has_modes, lags = form.modes is not None, form.lags
     late = form.pressure == MEAN and not general  # one pass over the points: a second would not fit side by side
-    k, R = kinematics(precision, finite), scalars(precision).real
+    k, R = law_kinematics(precision, law_name, finite), scalars(precision).real
     dilatation_of, deviator, volumetric_energy = k.dilatation, k.deviator, k.volumetric_energy
 
     # logarithms need all their digits
@@ -172,7 +173,7 @@ def stress_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
     points, corners, shown = form.points, form.corners, form.shown
     shared, own = shared_function(maker, precision, law_name, finite), form.pressure == OWN
     plastic, general, read = bool(law_name), point.general, point.read
-    k, R = kinematics(precision, finite), scalars(precision).real
+    k, R = law_kinematics(precision, law_name, finite), scalars(precision).real
     dilatation_of, deviator, pressure_of, cauchy = k.dilatation, k.deviator, k.pressure, k.cauchy
 
     @wp.kernel(enable_backward=False, module="unique")

@@ -18,6 +18,7 @@ from warp_mca.kernels.elements.readings import energy_kernel, stress_kernel
 from warp_mca.kernels.elements.tet10_points import BESIDE, FAR, POINT, between, centre_function, tet10_functions
 from warp_mca.kernels.elements.viscosity import viscosity_function
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.materials.isochoric import law_kinematics
 from warp_mca.kernels.materials.kinematics import kinematics
 from warp_mca.kernels.records.extremes import keep_functions
 
@@ -195,7 +196,7 @@ def tet10_force_kernel(maker: Maker, precision: str, law_name: str, finite: bool
     by_law = point.general
     mean_pressure = pressure_function(precision, finite, mean, viscous)
     keep_strain, keep_volume, _ = keep_functions(R)
-    k = kinematics(precision, finite)
+    k = law_kinematics(precision, law_name, finite)
     dilatation_of, deviator, pressure_of, nominal = k.dilatation, k.deviator, k.pressure, k.nominal
 
     bounds = (PATCH, BLOCKS) if precision == "mixed" and not (finite or by_law) else None

@@ -18,6 +18,7 @@ from warp_mca.kernels.elements.readings import stress_kernel as stress_of
 from warp_mca.kernels.elements.viscosity import viscosity_function
 from warp_mca.kernels.hardware.early_launch import begins_early, wait_for_previous
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
+from warp_mca.kernels.materials.isochoric import law_kinematics
 from warp_mca.kernels.materials.kinematics import kinematics
 from warp_mca.kernels.materials.point import material_point
 from warp_mca.kernels.records.extremes import keep_functions
@@ -116,7 +117,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False, viscous: i
     plastic, update = bool(law_name), material_point(precision, law_name, finite, points=1).update
     add_matrices = fused(precision).add_matrices
     keep_strain, keep_volume, _ = keep_functions(R)
-    k = kinematics(precision, finite)
+    k = law_kinematics(precision, law_name, finite)
     dilatation_of, deviator, nominal, pressure_of = k.dilatation, k.deviator, k.nominal, k.pressure
     viscous_pressure = viscosity_function(precision, finite, viscous)
 

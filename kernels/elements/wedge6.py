@@ -15,6 +15,7 @@ from warp_mca.kernels.elements.viscosity import viscosity_function
 from warp_mca.kernels.elements.wedge_shape import CORNERS, POINTS, SIXTH, pattern_functions, place_function
 from warp_mca.kernels.elements.wedge_strain import force_function, shape_functions
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.materials.isochoric import law_kinematics
 from warp_mca.kernels.materials.kinematics import kinematics
 from warp_mca.kernels.materials.laws import Law, law_functions
 from warp_mca.kernels.materials.point import material_point
@@ -32,7 +33,7 @@ def kept(law: Law, finite: bool) -> tuple[str, ...]:
 
 def lags(law: Law, finite: bool) -> bool:
     """Whether the internal vector has an inelastic part."""
-    return law.general or bool(law.history)
+    return law.always or bool(law.history)
 
 
 @cache
@@ -57,7 +58,9 @@ def formulation(precision: str, law_name: str, finite: bool) -> Formulation:
         return g
 
     given = (OWN, Wedge6, load_shape, gradient, rotation, 1, corner_of)
-    return Formulation("wedge6", CORNERS, POINTS, *given, enriched=enriched, lags=bool(law_name))
+    return Formulation(
+        "wedge6", CORNERS, POINTS, *given, enriched=enriched, lags=lags(law_functions(law_name, precision), finite)
+    )
 
 
 @cache
@@ -97,7 +100,8 @@ def vector_function(precision: str, law_name: str, finite: bool) -> Any:
     """
     R, vec3 = scalars(precision).real, scalars(precision).vec3
     Wedge6, _, _, _ = shape_functions(precision, law_name, finite)
-    first = POINTS * law_functions(law_name, precision).size
+    law = law_functions(law_name, precision)
+    always, first = law.always, POINTS * law.size
 
     @wp.func
     def keep_vector(
@@ -105,14 +109,16 @@ def vector_function(precision: str, law_name: str, finite: bool) -> Any:
         left: vec3,
         loose: vec3,
         e: int,
+        flows: int,
         history_out: wp.array2d(dtype=R),
         extreme_out: wp.array2d(dtype=R),
     ):
-        change = R(0.5) * (shape.G * loose)
-        for i in range(3):
-            history_out[wp.static(first) + i, e] = history_out[wp.static(first) + i, e] - change[i]
-        work = R(0.5) * R(SIXTH) * shape.volume * wp.dot(left, loose)
-        extreme_out[LAG_LOSS, e] = extreme_out[LAG_LOSS, e] + work
+        if wp.static(always) or flows != 0:
+            change = R(0.5) * (shape.G * loose)
+            for i in range(3):
+                history_out[wp.static(first) + i, e] = history_out[wp.static(first) + i, e] - change[i]
+            work = R(0.5) * R(SIXTH) * shape.volume * wp.dot(left, loose)
+            extreme_out[LAG_LOSS, e] = extreme_out[LAG_LOSS, e] + work
 
     return keep_vector
 
@@ -125,8 +131,9 @@ def force_kernel(precision: str, law_name: str, finite: bool = False, viscous: i
     _, load_shape, enriched, strain_at = shape_functions(precision, law_name, finite)
     gradient, place_of = formulation(precision, law_name, finite).gradient, place_function(precision)
     forces, keep_vector = force_function(precision, law_name, finite), vector_function(precision, law_name, finite)
-    point, k = material_point(precision, law_name, finite), kinematics(precision, finite)
+    point, k = material_point(precision, law_name, finite), law_kinematics(precision, law_name, finite)
     plastic, general, update = bool(law_name), point.general, point.update
+    keeps = lags(law_functions(law_name, precision), finite)
     dilatation_of, deviator, pressure_of, nominal = k.dilatation, k.deviator, k.pressure, k.nominal
     keep_strain, keep_volume, _ = keep_functions(R)
     with_viscosity = viscous_function(precision, law_name, finite, viscous)
@@ -182,9 +189,9 @@ def force_kernel(precision: str, law_name: str, finite: bool = False, viscous: i
                 A = A + strain_at(shape, g) * P
         f, left, loose = forces(shape, law[m, 0], law[m, 1], A, M, Mz, Mr, Ms)
         f = with_viscosity(f, shape, e, dt, extreme_out)
+        if wp.static(keeps):
+            keep_vector(shape, left, loose, e, flows, history_out, extreme_out)
         if wp.static(plastic):
-            if wp.static(general) or flows != 0:
-                keep_vector(shape, left, loose, e, history_out, extreme_out)
             if flows != flag:
                 yielded_out[e] = flows
         keep_strain(e, largest, extreme_out)

@@ -51,7 +51,8 @@ def shape_functions(precision: str, law_name: str, finite: bool) -> tuple[Any, A
     dyad, without_trace = tensor_functions(precision)
     hooke, vector_of, place_of = hooke_function(precision), mode_functions(precision).solve, place_function(precision)
     rotated = mean_frame(precision, finite)
-    plastic, first = bool(law_name), POINTS * law_functions(law_name, precision).size
+    law = law_functions(law_name, precision)
+    keeps, first = law.always or bool(law.history), POINTS * law.size
 
     @wp.struct
     class Wedge6:
@@ -130,7 +131,7 @@ def shape_functions(precision: str, law_name: str, finite: bool) -> tuple[Any, A
         n = shape.N[2]
         d = -vector_of(hooke(shape.E, K, G) * n, n, K, G)
         h = vec3()
-        if wp.static(plastic):
+        if wp.static(keeps):
             for i in range(3):
                 h += history[wp.static(first) + i, e] * shape.N[i]
         shape.h = h

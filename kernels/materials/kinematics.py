@@ -3,7 +3,7 @@
 Both act on the displacement gradient H in a frame that has turned with the element, F = I + H. The deviatoric strain
 goes to the return map; the stress that comes back, work-conjugate to it, turns into the first Piola-Kirchhoff stress.
 Logarithmic: E = ln(F^T F) / 2 with additive plastic strain, Miehe, Apel and Lambrecht, Comput. Meth. Appl. Mech.
-Engng 191 (2002) 5383.
+Engng 191 (2002) 5383. Hyperelastic laws take the isochoric strain of `isochoric`, which needs no logarithm.
 """
 
 from dataclasses import dataclass

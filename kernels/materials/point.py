@@ -10,6 +10,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.base.errors import bad_value
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.materials.flow import flow_function, history_functions, plastic_strain_functions, rated_function
 from warp_mca.kernels.materials.kinematics import kinematics
@@ -26,8 +27,9 @@ class MaterialPoint:
         size: rows of the history of a point; none where nothing is kept.
         general: whether the law gives the pressure too, which is 0 below otherwise.
         update: (strain, theta, G, g, e, m, flag, law, dt, history_out) -> (S, pressure, dp) of point g: the deviatoric
-            stress conjugate to the deviatoric `strain`, the pressure conjugate to J = 1 + theta, both in Pa, and the
-            growth of the equivalent plastic strain. The history is kept; `flag` says whether there is any yet.
+            stress conjugate to the deviatoric `strain` (Mandel's of hyperelastic laws, see `isochoric`), the pressure
+            conjugate to J = 1 + theta, both in Pa, and the growth of the equivalent plastic strain. The history is
+            kept; `flag` says whether there is any yet.
         read: (strain, theta, G, g, e, m, flag, law, history) -> (S, pressure, p, stored, dissipated) of the history as
             it stands; energies [J/m^3], without that of the pressure where the law is not general.
     """
@@ -40,12 +42,20 @@ class MaterialPoint:
 
 @cache
 def material_point(precision: str, law_name: str, finite: bool, points: int = 0) -> MaterialPoint:
-    """The point of a law, elastic where that is "", with the strain measure of `kinematics`; `points` as above."""
+    """The point of a law, elastic where that is "", with the strain of `law_kinematics`; `points` as above.
+
+    Raises:
+        RequestError: a hyperelastic law is to take small strain.
+    """
     functions = law_functions(law_name, precision)
     if functions.general:
         return _general_point(precision, law_name, finite, points)
     t = scalars(precision)
     R, mat33 = t.real, t.mat33
+    if functions.hyperelastic and not finite:
+        raise bad_value("Body.kinematics", "corotational", "a hyperelastic law needs kinematics='finite'")
+    if functions.hyperelastic or functions.viscous:
+        return _elastic_point(precision, law_name, points)
     plastic, rated = bool(law_name), functions.rated
     flow_at, rated_at = (make(precision, law_name, points) for make in (flow_function, rated_function))
     read_history, _ = history_functions(precision, law_name, points)
@@ -102,6 +112,63 @@ def material_point(precision: str, law_name: str, finite: bool, points: int = 0)
                     dissipated = plastic_energy(eps_p, p, read_parameters(law, m, R(1.0)))
         stored = G * wp.ddot(strain - eps_p, strain - eps_p)
         return R(2.0) * G * (strain - eps_p), R(0.0), p, stored, dissipated
+
+    return MaterialPoint(functions.size, False, update, read)
+
+
+def _elastic_point(precision: str, law_name: str, points: int) -> MaterialPoint:
+    """Of a law that gives the deviatoric stress of an energy, with a history where it is viscous."""
+    t = scalars(precision)
+    R, mat33 = t.real, t.mat33
+    functions = law_functions(law_name, precision)
+    viscous, read_parameters = functions.viscous, functions.parameters
+    mandel, stored_energy = functions.mandel, functions.stored
+    law_stress, law_energies = functions.deviatoric, functions.energies
+    read_history, write_history = history_functions(precision, law_name, points)
+
+    @wp.func
+    def update(
+        strain: mat33,
+        theta: R,
+        G: R,
+        g: int,
+        e: int,
+        m: int,
+        flag: int,
+        law: wp.array2d(dtype=R),
+        dt: R,
+        history_out: wp.array2d(dtype=R),
+    ):
+        c = read_parameters(law, m, R(1.0))
+        if wp.static(viscous):
+            S, h = law_stress(strain, read_history(history_out, g, e), dt, c)
+            write_history(history_out, g, e, h)
+        else:
+            S = mandel(strain, c)
+        return S, R(0.0), R(0.0)
+
+    @wp.func
+    def read(
+        strain: mat33,
+        theta: R,
+        G: R,
+        g: int,
+        e: int,
+        m: int,
+        flag: int,
+        law: wp.array2d(dtype=R),
+        history: wp.array2d(dtype=R),
+    ):
+        c = read_parameters(law, m, R(1.0))
+        dissipated = R(0.0)
+        if wp.static(viscous):
+            h = read_history(history, g, e)
+            S, _h = law_stress(strain, h, R(0.0), c)
+            stored, dissipated = law_energies(strain, h, c)
+        else:
+            S = mandel(strain, c)
+            stored = stored_energy(strain, c)
+        return S, R(0.0), R(0.0), stored, dissipated
 
     return MaterialPoint(functions.size, False, update, read)
 

@@ -79,6 +79,9 @@ class Body:
             raise bad_value(f"Body {self.name}.material", self.material, remedy)
         for material in materials:
             check_law(material)
+            if material.finite_only and self.kinematics != "finite" and not self.rigid:
+                remedy = f"set kinematics='finite', which {type(material).__name__} needs for its large strains"
+                raise bad_value(f"Body {self.name}.kinematics", self.kinematics, remedy)
         if self.element not in tuple(ELEMENTS):
             raise bad_value(f"Body {self.name}.element", self.element, f"choose among {', '.join(ELEMENTS)}")
         validate.choice(f"Body {self.name}", ("corotational", "finite"), kinematics=self.kinematics)

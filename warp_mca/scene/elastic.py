@@ -25,12 +25,14 @@ class Elastic:
         nu: Poisson's ratio [-], in (-1, 0.5).
         rho: density [kg/m^3].
         law: module of its law, with the functions of `kernels.materials.laws`; empty where it never flows.
+        finite_only: whether it makes no sense at small strain.
     """
 
     E: float
     nu: float
     rho: float
     law: ClassVar[str] = ""
+    finite_only: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         validate.plain(self)

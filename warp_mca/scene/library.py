@@ -1,4 +1,4 @@
-"""Owns the library of metals with published parameters: `mca.library.STEEL_4340` is a material as any other.
+"""Owns the library of materials with published parameters: `mca.library.STEEL_4340` is a material as any other.
 
 `SOURCES` says of each where its parameters are from, and for what they were measured. Elastic constants are those of
 handbooks where the source has none. Parameters of one's own lot and temper are better than any of these: yield stresses
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from warp_mca.scene.elastic import Elastic
 from warp_mca.scene.metals import JohnsonCook
+from warp_mca.scene.rubbers import Ogden
 
 _JC83 = (
     "Johnson and Cook, Proc. 7th Int. Symp. Ballistics (1983) 541: torsion to 400 1/s, tension by Hopkinson bar to "
@@ -51,6 +52,7 @@ ALUMINIUM_7075_T651 = JohnsonCook(
 STEEL_A36 = JohnsonCook(
     E=200e9, nu=0.26, rho=7850.0, A=286.1e6, B=500.1e6, n=0.2282, C=0.022, m=0.917, T_melt=1773.0, c_p=486.0
 )
+NATURAL_RUBBER = Ogden(mu=(0.63e6, 0.0012e6, -0.01e6), alpha=(1.3, 5.0, -2.0), rho=930.0)
 
 SOURCES: dict[str, str] = {
     **dict.fromkeys(
@@ -62,6 +64,9 @@ SOURCES: dict[str, str] = {
     "rates to some 10^4 1/s",
     "ALUMINIUM_7075_T651": "Brar, Joshi and Harris, AIP Conf. Proc. 1195 (2009) 945: tension, slow and by Hopkinson "
     "bar, to 520 K",
+    "NATURAL_RUBBER": "Ogden, Proc. R. Soc. A 326 (1972) 565, fitted to Treloar, Trans. Faraday Soc. 40 (1944) 59: "
+    "vulcanised with 8 % of sulphur, without filler, slow tension to 7.6 times its length, equal tension of two axes "
+    "to 4.5, shear; the bulk modulus is that of the default nu, lower than the real one",
     "STEEL_A36": "Schwer, 6th European LS-DYNA Users' Conference (2007), after Seidt and others: to 2000 1/s",
 }
 

@@ -233,7 +233,7 @@ def _encoded(value: object, arrays: list[NDArray]) -> object:
         if type(value) not in _vocabulary().values():
             remedy = "a model file holds warp_mca's own classes and what warp_mca.register was given; use these"
             raise bad_value("scene", type(value).__name__, remedy)
-        members = {f.name: _encoded(getattr(value, f.name), arrays) for f in dataclasses.fields(value)}
+        members = {f.name: _encoded(getattr(value, f.name), arrays) for f in dataclasses.fields(value) if f.init}
         module = type(value).__module__
         outside = {} if module.startswith("warp_mca.") else {"$module": module}
         return {"$type": type(value).__name__, **outside, **members}

@@ -180,7 +180,9 @@ def _step_key(scene: Scene, options: RunOptions, number: int) -> object:
 def _elastic(body: Body) -> object:
     """What the material has to do with the stable step: stiffness and density, not strength."""
     materials = body.material.values() if isinstance(body.material, Mapping) else (body.material,)
-    return [(item.E, item.nu, item.rho) if isinstance(item, Elastic) else item for item in materials]
+    return [
+        (item.bulk_modulus, item.shear_modulus, item.rho) if isinstance(item, Elastic) else item for item in materials
+    ]
 
 
 def _contact_key(contact: Contact | ContactAll) -> object:

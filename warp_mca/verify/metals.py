@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import Any
 
@@ -11,8 +10,8 @@ import numpy as np
 import warp_mca as mca
 from warp_mca.base.arrays import Array
 from warp_mca.verify.case import Row, Setup, case
+from warp_mca.verify.driven import SIZE, driven_cube, imposed, turned
 from warp_mca.verify.large_strain import slope_of_log
-from warp_mca.verify.material import displacement
 
 STEEL: dict[str, Any] = {"E": 200e9, "nu": 0.3, "rho": 7800.0}
 METALS: dict[str, mca.Elastic] = {
@@ -26,7 +25,6 @@ METALS: dict[str, mca.Elastic] = {
     ),
     "Chaboche": mca.Chaboche(**STEEL, sigma_y=250e6, C=(60e9, 5e9), gamma=(400.0, 30.0), Q=100e6, b=10.0),
 }
-SIZE, TURNS = 1e-3, 3  # edge of the element [m], turns of the body
 STRAIN = {"corotational": 0.01, "finite": 0.04}  # greatest axial strain [-]
 _TABLE = 600  # entries of the velocity tables
 
@@ -116,41 +114,7 @@ def driven_element(metal: mca.Elastic, course: str, duration: float, kinematics:
     U = np.zeros((len(s), 3, 3))
     U[:, 0, 0], U[:, 1, 1], U[:, 2, 2] = 1.0 + axial, 1.0 - 0.5 * axial, 1.0 - 0.5 * axial
     U[:, 0, 1] = U[:, 1, 0] = 0.5 * math.sqrt(3.0) * shear
-    if course == "turned":
-        from scipy.spatial.transform import Rotation
-
-        axis = np.array([1.0, 2.0, 2.0]) / 3.0
-        angle = 2.0 * np.pi * TURNS * (s - np.sin(2.0 * np.pi * s) / (2.0 * np.pi))
-        U = Rotation.from_rotvec(angle[:, None] * axis).as_matrix() @ U
-    rate = np.gradient(U, duration * s, axis=0, edge_order=2)
-    mesh = mca.Box(size=(SIZE, SIZE, SIZE), divisions=(1, 1, 1)).build()
-    corners = {f"corner{i}": np.array([i], dtype=np.int32) for i in range(8)}
-    mesh = dataclasses.replace(mesh, node_sets={**mesh.node_sets, **corners})
-    times, middle = tuple((duration * s).tolist()), 0.5 * SIZE
-    driven = tuple(
-        mca.Prescribed(body="cube", nodes=f"corner{i}", axis=axis, times=times, velocities=tuple(speed.tolist()))
-        for i, X in enumerate(mesh.points)
-        for axis, speed in zip("xyz", (rate @ X).T, strict=True)
-    )
-    line = mca.Line(body="cube", start=(0.0, middle, middle), end=(SIZE, middle, middle))
-    return mca.Scene(
-        name="driven_element",
-        bodies=(mca.Body(name="cube", geometry=mesh, material=metal, kinematics=kinematics),),
-        prescribed=driven,
-        impact=mca.ImpactPhase(duration=duration, output_interval=duration / 50.0, energy_tolerance=0.1),
-        paths=(mca.Path(name="axis", lines=(line,), spacing=middle),),
-    )
-
-
-def imposed(scene: mca.Scene, time: Array) -> Array:
-    """Deformation gradients of `driven_element` at these times [s], shape (row_count, 3, 3)."""
-    F = np.zeros((len(time), 3, 3)) + np.eye(3)
-    points: Array = scene.bodies[0].geometry.points  # pyright: ignore[reportAttributeAccessIssue]
-    for item in scene.prescribed:
-        X = points[int(str(item.nodes).removeprefix("corner"))]
-        if np.count_nonzero(X) == 1:  # along one axis
-            F[:, "xyz".index(item.axis), int(X.argmax())] += displacement(item, time) / SIZE
-    return F
+    return driven_cube(metal, turned(U) if course == "turned" else U, duration, kinematics=kinematics)
 
 
 def exact_course(metal: Any, F: Array, time: Array, finite: bool, every: int) -> tuple[Array, float]:

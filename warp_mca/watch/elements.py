@@ -31,10 +31,31 @@ def scattered_pressure(c: Context, most: float) -> Iterator[Values]:
     for body in c.scene.bodies:
         mesh = c.meshes[body.name]
         if not body.rigid and any(part.element.name == "tet10" for part in body_cells(body, mesh)):
-            moduli = [(item.bulk_modulus, item.shear_modulus) for item, _ in body_materials(body, mesh)]
-            nu = max((3.0 * K - 2.0 * G) / (6.0 * K + 2.0 * G) for K, G in moduli)
+            # rubber at large strain has a row of its own
+            soft = [item for item, _ in body_materials(body, mesh) if not item.finite_only]
+            moduli = [(item.bulk_modulus, item.shear_modulus) for item in soft]
+            nu = max(((3.0 * K - 2.0 * G) / (6.0 * K + 2.0 * G) for K, G in moduli), default=0.0)
             if nu > most:
                 yield dict(body=body.name, nu=nu)
+
+
+@row(
+    "{element} {does} where rubber is nearly incompressible; body {body} has nu = {nu:.4g}:",
+    "take element='hex8', or 'tet10' for tetrahedra",
+    0.48,
+    "Poisson's ratio at most, of materials for large strain only",
+    kind=Kind.ADVICE,
+    when=When.BEFORE,
+)
+def enriched_rubber(c: Context, most: float) -> Iterator[Values]:
+    """Poisson's ratio of rubber in bodies of hexahedra with internal modes, or of `tet10_mean`."""
+    stiff, soft = "is some percent too stiff, and loses energy near nu = 0.5,", "is too soft, and may become unstable,"
+    known = {**dict.fromkeys(("hex8i", "hex8w", "hex8w3"), stiff), "tet10_mean": soft}
+    for body in c.scene.bodies:
+        materials = [material for material, _ in body_materials(body, c.meshes[body.name]) if material.finite_only]
+        nu = max((material.nu for material in materials), default=0.0)
+        if body.element in known and not body.rigid and nu > most:
+            yield dict(body=body.name, element=body.element, does=known[body.element], nu=nu)
 
 
 @row(

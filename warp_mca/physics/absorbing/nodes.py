@@ -107,8 +107,8 @@ def _face_matrices(parts: Assembly, item: Absorbing, face: Index, element: Index
     """
     centre = _centre(parts, item)
     rho = parts.rho[element]
-    c_p = np.sqrt((parts.K[element] + 4.0 / 3.0 * parts.G[element]) / rho)
-    c_s = np.sqrt(parts.G[element] / rho)
+    K, G = np.array([material.parameters[:2] for material in parts.materials])[parts.material[element]].T
+    c_p, c_s = np.sqrt((K + 4.0 / 3.0 * G) / rho), np.sqrt(G / rho)
     x, found = parts.X[face], np.zeros((2, len(face), 4, 3, 3))
     for xi, eta in ((a, b) for a in (-_GAUSS, _GAUSS) for b in (-_GAUSS, _GAUSS)):
         left, right, low, high = 1 - xi, 1 + xi, 1 - eta, 1 + eta
@@ -120,7 +120,7 @@ def _face_matrices(parts: Assembly, item: Absorbing, face: Index, element: Index
         n = normal / area[:, None]
         nn = n[:, :, None] * n[:, None, :]
         distance = np.linalg.norm(shape @ x - centre, axis=1)
-        spring = parts.G[element] / distance
+        spring = G / distance
         for k, (across, along) in enumerate(((rho * c_p, rho * c_s), (NORMAL * spring, TANGENTIAL * spring))):
             matrix = along[:, None, None] * (np.eye(3) - nn) + across[:, None, None] * nn
             found[k] += shape[:, None, None] * (area[:, None, None] * matrix)[:, None]
