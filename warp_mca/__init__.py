@@ -46,6 +46,12 @@ from warp_mca.scene import (
     library,
 )
 from warp_mca.scene.elastic import Elastic
+from warp_mca.scene.failure import (
+    JohnsonCookFailure,
+    PlasticStrainFailure,
+    PrincipalStrainFailure,
+    PrincipalStressFailure,
+)
 from warp_mca.scene.metals import Chaboche, CowperSymonds, J2Bilinear, J2Table, J2Voce, JohnsonCook
 
 if TYPE_CHECKING:
@@ -102,6 +108,10 @@ __all__ = [
     "CowperSymonds",
     "JohnsonCook",
     "Chaboche",
+    "PlasticStrainFailure",
+    "JohnsonCookFailure",
+    "PrincipalStressFailure",
+    "PrincipalStrainFailure",
     "library",
     "Contact",
     "ContactAll",

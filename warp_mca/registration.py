@@ -73,6 +73,7 @@ TABLES = {
     "friction law": Table(
         "warp_mca.scene.friction_laws", "FRICTION_LAWS", ("warp_mca.scene.friction_laws", "FrictionLaw")
     ),
+    "failure": Table("warp_mca.scene.failure", "FAILURES", ("warp_mca.scene.failure", "Failure")),
     "joint": Table("warp_mca.scene.joints", "JOINTS", ("warp_mca.scene.joints", "Joint")),
     "load": Table("warp_mca.scene.loads", "LOADS", ("warp_mca.scene.loads", "Load")),
     "cell type": Table(

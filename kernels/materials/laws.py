@@ -20,6 +20,7 @@ FLOW_HISTORY = ("deviator", "scalar")  # plastic strain and equivalent plastic s
 FLOW = ("parameters", "return_map", "plastic_energy")
 RATED = ("parameters", "flow", "plastic_work")
 GENERAL = ("parameters", "stress", "energies")
+OPTIONAL = ("temperature",)
 
 
 def row_count(history: tuple[str, ...]) -> int:
@@ -53,6 +54,8 @@ class Law:
             `Body.kinematics` is finite; the stress is the one conjugate to it. The history is a vector of the law's
             rows, 0 at first. dt [s] is the time since the history was kept; 0 asks for the stress of the history as it
             stands.
+        temperature: of a law with heat, may be left out: (history, c) -> T*, from 0 where nothing softens to 1 where
+            it melts.
         energies: of a general law: (strain, history, c) -> (stored, dissipated), with the history that `stress` gave.
         history: kinds of what each point keeps, out of `ROWS`; HISTORY of the module of a rated or general law. That
             of a rated law begins with `FLOW_HISTORY`.
@@ -67,6 +70,7 @@ class Law:
     plastic_work: Any = None
     stress: Any = None
     energies: Any = None
+    temperature: Any = None
     history: tuple[str, ...] = ()
     plastic_row: int = -1
 
@@ -104,7 +108,8 @@ def law_functions(name: str, precision: str) -> Law:
         module = import_module(name)
         general, rated = hasattr(module, "stress"), hasattr(module, "flow")
         names = GENERAL if general else RATED if rated else FLOW
-        made = {key: getattr(module, key)(precision) for key in names}
+        optional = [key for key in OPTIONAL if hasattr(module, key)]
+        made = {key: getattr(module, key)(precision) for key in (*names, *optional)}
         history = tuple(module.HISTORY) if general or rated else FLOW_HISTORY
         if rated and not general and history[:2] != FLOW_HISTORY:
             raise ValueError(f"HISTORY = {history} of a rated law begins with {', '.join(FLOW_HISTORY)}")

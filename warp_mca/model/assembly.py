@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from warp_mca.base.errors import bad_value
 from warp_mca.geometry.cell_types import CELL_TYPES
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.kernels.elements.patch_layout import PATCH
+from warp_mca.model.failing import Failing, criterion_of, failing_of
 from warp_mca.model.stable_step import Elements, StableStep, at_elements, element_steps, stable_step
 from warp_mca.model.viscosity import viscosities
 from warp_mca.physics.contact.stiffness import Inertia
@@ -46,6 +48,7 @@ class Block:
             nodes: levels one after the other, in each of them chains; empty with one rate.
         viscosity: c1 rho c h [Pa s] and c2^2 rho h^2 [Pa s^2] of each, see `kernels.elements.viscosity`, shape (2,
             element_count), float64; None without bulk viscosity.
+        failing: how they fail, or None where they never do.
     """
 
     element: str
@@ -57,12 +60,14 @@ class Block:
     ends: tuple[int, ...] = ()
     part_ends: tuple[int, ...] = ()
     viscosity: Array | None = None
+    failing: Failing | None = None
 
     def part(self, element: NDArray[np.intp]) -> Block:
         """A block of some of the elements by themselves."""
         viscosity = None if self.viscosity is None else self.viscosity[:, element]
         conn, material = np.ascontiguousarray(self.conn[:, element]), self.material[element]
-        return replace(self, conn=conn, material=material, viscosity=viscosity, first=0, ends=(), part_ends=())
+        found = replace(self, conn=conn, material=material, viscosity=viscosity, first=0, ends=(), part_ends=())
+        return replace(found, failing=self.failing and self.failing.part(element))
 
     def without_viscosity(self) -> Block:
         """The block with coefficients of zero, if it has any: its kernels and its `kind` stay."""
@@ -85,9 +90,11 @@ class Block:
         return bool(self.law)
 
     @property
-    def kind(self) -> tuple[bool, str, str, bool, bool]:
-        """Key of the block: (not plastic, law, element, finite, viscous). Blocks of a model are sorted by it."""
-        return not self.plastic, self.law, self.element, self.finite, self.viscous
+    def kind(self) -> tuple[bool, str, str, bool, bool, str]:
+        """Key of the block: (not plastic, law, element, finite, viscous, criterion of failure). Blocks of a model are
+        sorted by it."""
+        failure = self.failing.law if self.failing else ""
+        return not self.plastic, self.law, self.element, self.finite, self.viscous, failure
 
 
 class Assembly:
@@ -170,28 +177,34 @@ class Assembly:
         """
         blocks, order = [], [np.zeros(0, dtype=np.int32)]
         every = [None if rigid else viscosities(self, k) for k in range(len(self.cells))]
-        for law in sorted({m.law for m in self.materials}, key=lambda law: (not law, law)):
-            flowing = np.array([m.law == law for m in self.materials])[self.material]
-            for part, viscosity in zip(self.cells, every, strict=True):
-                mine = np.flatnonzero(flowing[part.index] & (self.rigid[part.index] == rigid))
-                if len(mine):
-                    if part.element.patches:
-                        mine = mine[compact_order(self.X, part.conn[mine], PATCH)]
-                    index = part.index[mine]
-                    blocks.append(
-                        Block(
-                            element=part.element.name,
-                            law=law,
-                            finite=part.finite,
-                            conn=np.ascontiguousarray(part.conn[mine].T),
-                            material=self.material[index],
-                            first=first,
-                            viscosity=None if viscosity is None else viscosity[:, mine],
-                        )
-                    )
-                    order.append(index)
-                    first += len(index)
+        laws = sorted({m.law for m in self.materials}, key=lambda law: (not law, law))
+        for law, (k, part), failure in product(laws, enumerate(self.cells), self._criteria(rigid)):
+            alike = [m.law == law and (rigid or criterion_of(m) == failure) for m in self.materials]
+            mine = np.flatnonzero(np.array(alike)[self.material[part.index]] & (self.rigid[part.index] == rigid))
+            if not len(mine):
+                continue
+            if part.element.patches:
+                mine = mine[compact_order(self.X, part.conn[mine], PATCH)]
+            index, viscosity = part.index[mine], every[k]
+            blocks.append(
+                Block(
+                    element=part.element.name,
+                    law=law,
+                    finite=part.finite,
+                    conn=np.ascontiguousarray(part.conn[mine].T),
+                    material=self.material[index],
+                    first=first,
+                    viscosity=None if viscosity is None else viscosity[:, mine],
+                    failing=failing_of(failure, self.materials, self.material[index], self.volume[index]),
+                )
+            )
+            order.append(index)
+            first += len(index)
         return tuple(blocks), np.concatenate(order)
+
+    def _criteria(self, rigid: bool) -> list[str]:
+        """Modules of the criteria by which elements fail, "" for those that never do; rigid ones do not."""
+        return [""] if rigid else sorted({criterion_of(m) for m in self.materials})
 
     def stable(self, added: Array) -> StableStep:
         """Stable step with what contact springs add to the eigenvalue at each node [1/s^2]."""

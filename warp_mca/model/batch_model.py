@@ -12,6 +12,7 @@ from warp_mca.base.arrays import Index
 from warp_mca.base.errors import bad_value
 from warp_mca.base.joining import join, offsets
 from warp_mca.model.assembly import Block
+from warp_mca.model.failing import joined
 from warp_mca.model.layout import Layout
 from warp_mca.model.mass_scaling import MassScaling
 from warp_mca.model.model import Model
@@ -47,6 +48,9 @@ def join_models(models: Sequence[Model]) -> Model:
     if len(models) == 1:
         return models[0]
     check_batch([model.loads for model in models])
+    if len({model.fails for model in models}) > 1:
+        which = f"scenes[{[model.fails for model in models].index(True)}]"
+        raise bad_value(f"failure of materials of {which}", "given", "others have none; run these in batches apart")
     starts = {kind: offsets([count(model) for model in models]) for kind, count in _COUNTS.items()}
     nodes, elements = starts["nodes"], starts["elements"]
     blocks, order, ranges = _blocks(models, nodes, elements)
@@ -110,7 +114,7 @@ def _blocks(models: Sequence[Model], nodes: Index, elements: Index) -> tuple[tup
     blocks, order, first = [], [np.zeros(0, dtype=np.int32)], 0
     ranges = np.zeros((len(models), len(kinds), 2), dtype=np.int32)
     for column, kind in enumerate(kinds):
-        conn, material, viscosity, end = [], [], [], first
+        conn, material, viscosity, failing, end = [], [], [], [], first
         for k, model in enumerate(models):
             ranges[k, column] = end
             for block in model.blocks:
@@ -119,6 +123,7 @@ def _blocks(models: Sequence[Model], nodes: Index, elements: Index) -> tuple[tup
                     conn.append(block.conn + nodes[k])
                     material.append(block.material + laws[k])
                     viscosity += [] if block.viscosity is None else [block.viscosity]
+                    failing.append(block.failing)
                     order.append(model.element_of[block.first : block.first + count] + elements[k])
                     end += count
             ranges[k, column, 1] = end
@@ -128,6 +133,7 @@ def _blocks(models: Sequence[Model], nodes: Index, elements: Index) -> tuple[tup
                 conn=np.ascontiguousarray(np.concatenate(conn, axis=1)),
                 material=np.concatenate(material),
                 viscosity=np.concatenate(viscosity, axis=1) if viscosity else None,
+                failing=joined(failing),
                 first=first,
                 ends=tuple((ranges[:, column, 1] - first).tolist()),
                 part_ends=(),  # of elements with steps of their own, which batches have not
