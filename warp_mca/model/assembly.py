@@ -254,9 +254,12 @@ class Assembly:
 
     def faces(self, surface: Surface) -> Faces:
         """Boundary faces of a surface."""
-        node, element = self.meshes[surface.body].surface(surface.nodes)
-        node = (node + self.node_start[surface.body]).astype(np.int32)
-        element = (element + self.element_start[surface.body]).astype(np.int32)
+        return self.faces_of(surface.body, *self.meshes[surface.body].surface(surface.nodes))
+
+    def faces_of(self, body: str, node: Index, element: Index) -> Faces:
+        """Faces of a body, whose nodes and elements are those of its mesh."""
+        node = (node + self.node_start[body]).astype(np.int32)
+        element = (element + self.element_start[body]).astype(np.int32)
         return make_faces(self.X, node, element, self.K, self.G, self.volume * self.face_depth, self.face_height)
 
     def nearest(self, point: Point | None) -> int:

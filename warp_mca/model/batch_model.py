@@ -48,6 +48,9 @@ def join_models(models: Sequence[Model]) -> Model:
     if len(models) == 1:
         return models[0]
     check_batch([model.loads for model in models])
+    if any(model.fails and model.passes for model in models):
+        remedy = "contact follows it in single runs alone; use run in place of run_batch"
+        raise bad_value("failure of materials", "given", remedy)
     if len({model.fails for model in models}) > 1:
         which = f"scenes[{[model.fails for model in models].index(True)}]"
         raise bad_value(f"failure of materials of {which}", "given", "others have none; run these in batches apart")

@@ -187,7 +187,7 @@ def check_failure(owner: str, failure: object, flows: bool) -> None:
 
 
 def check_contacts(failing: Sequence[str], contacts: Sequence[Contact | ContactAll]) -> None:
-    """Refuse contacts of bodies whose elements may fail.
+    """Refuse contacts that do not follow the surface of bodies whose elements may fail.
 
     Raises:
         RequestError: there is such a contact.
@@ -195,5 +195,10 @@ def check_contacts(failing: Sequence[str], contacts: Sequence[Contact | ContactA
     for item in contacts if failing else ():
         sides = getattr(item, "sides", failing)
         for body in (name for name in failing if name in sides):
-            remedy = "contact does not follow the surface of elements that failed; leave out the contact or the failure"
-            raise bad_value(f"Body {body}.material", "failure", remedy)
+            what = f"Body {body}: failure"
+            if not hasattr(item, "sides"):
+                raise bad_value(what, "ContactAll", "it does not follow bodies that fail; list their pairs as Contacts")
+            if getattr(item, "bond", None):
+                raise bad_value(what, "Bond", "bonds do not go with elements that may fail; leave out one of them")
+            if item.initial_overlap == "press":
+                raise bad_value(what, "press", "bodies that fail are not pressed apart; choose another initial_overlap")

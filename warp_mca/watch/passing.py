@@ -13,6 +13,7 @@ from functools import partial
 
 import numpy as np
 
+from warp_mca.base.arrays import Index
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.model import Model
 from warp_mca.scene import Scene
@@ -42,7 +43,16 @@ class Watch:
         self._dt, self._most = dt, max(1, int(span / FEWEST / dt))
         self._driven = float(np.abs(model.table_value).max(initial=0.0))
         self._gravity = float(np.linalg.norm(scene.gravity))
-        self._skins = [Skin(b.name, meshes[b.name], model.X, model.node_start[b.name]) for b in scene.bodies]
+        self._of = scene, meshes, model
+        self.renew({})
+
+    def renew(self, faces: Mapping[str, Index]) -> None:
+        """Look at skins of these faces from now on, by body in the numbering of its mesh; others are whole."""
+        scene, meshes, model = self._of
+        self._skins = [
+            Skin(b.name, faces.get(b.name, meshes[b.name].boundary[0]), model.X, model.node_start[b.name])
+            for b in scene.bodies
+        ]
         self.cases = list(cases_of(scene, meshes, model, self._skins))
         self.nodes = np.concatenate([skin.nodes for skin in self._skins])[: None if self.cases else 0]
 

@@ -32,6 +32,7 @@ class FailureState:
         damage: of each point, 1 at failure [-], shape (point_count, element_count), float64.
         plastic: equivalent plastic strain of each point in the latest step [-], shape (point_count, element_count),
             float32 or float64.
+        left: 1 where contact has left the element's faces out [-], shape (element_count,), int32.
         count: elements that have failed [-], shape (1,), int32.
         u: displacement of each corner of each element, in failed ones that at failure [m], corner by corner, shape
             (corner_count element_count,), vec3d.
@@ -41,6 +42,7 @@ class FailureState:
     work: wp.array
     damage: wp.array
     plastic: wp.array
+    left: wp.array
     count: wp.array
     u: wp.array
 
@@ -96,6 +98,7 @@ class Failing:
             work=wp.zeros(count, dtype=self.real),
             damage=wp.zeros((self.points, count), dtype=wp.float64),
             plastic=wp.zeros((self.points, count), dtype=self.real),
+            left=wp.zeros(count, dtype=wp.int32),
             count=wp.zeros(1, dtype=wp.int32),
             u=wp.zeros(corners * count, dtype=wp.vec3d),
         )
