@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from warp_mca.base import validate
 from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
+from warp_mca.scene.failure import Failure
 from warp_mca.scene.materials import Material
 
 
@@ -59,9 +60,25 @@ def failing_of(law: str, materials: Sequence[Material], material: Index, volume:
         rows.append(found)
     width = max(map(len, rows))
     table = np.array([(*row, *[0.0] * (width - len(row))) for row in rows])
-    given = np.array([item.failure.length or np.nan if item.failure else np.nan for item in materials])
-    scale = given[material] / np.cbrt(volume)
-    return Failing(law, np.vstack([np.where(np.isnan(scale), 1.0, scale), table[material].T]))
+    scale, length = np.ones(len(volume)), np.cbrt(volume)
+    for k, item in enumerate(materials):
+        mine = material == k
+        if item.failure and mine.any():
+            scale[mine] = _scale(item.failure, length[mine])
+    return Failing(law, np.vstack([scale, table[material].T]))
+
+
+def _scale(failure: Failure, length: Array) -> Array:
+    """Factors on strains at failure in cells of these lengths [m], shape (cell_count,), float64.
+
+    Raises:
+        RequestError: they are none.
+    """
+    kind = type(failure).__name__
+    found = np.asarray(validate.call(f"{kind}.law", failure.law, "scale()", failure.scale, length), dtype=np.float64)
+    if found.shape != length.shape or not (np.isfinite(found) & (found > 0.0)).all():
+        raise bad_value(f"{kind}.scale()", validate.brief(found), "give a number above 0 for each cell")
+    return found
 
 
 def joined(parts: Sequence[Failing | None]) -> Failing | None:

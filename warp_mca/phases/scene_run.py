@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,6 +26,7 @@ from warp_mca.step.state_figures import (
     rigid_bodies,
 )
 from warp_mca.watch.energy import spring_shares
+from warp_mca.watch.failure_report import failure_report
 from warp_mca.watch.ledger import Ledger
 from warp_mca.watch.looks import SceneLooks
 from warp_mca.watch.mass_report import body_report, mass_report
@@ -163,6 +165,8 @@ class SceneRun:
         if self.solver.layout.count > 1:
             more["batch"] = {"scene": self.index, "scenes": self.solver.layout.count}
         more |= {"bodies": body_report(scene.bodies, self.ready.meshes), **mass_report(scene, model)}
+        if model.fails:
+            more["failure"] = failure_report(scene, self.ready.meshes, self.solver, self.state, self.index)
         if ledger.absorbs:
             more["absorbed_impulse"] = self.solver.absorbing.impulses(self.state, self.index)
         if any(model.penalties):
@@ -235,10 +239,13 @@ class SceneRun:
         """What the run says of itself; arguments are fields of `Finished`."""
         ready, nodes = self.ready, self.looks.nodes
         u, v = (np.asarray(field.numpy(), dtype=np.float64) for field in (self.state.u, self.state.v))
+        model = ready.model
+        if model.fails and len(self.solver.contacts) == len(model.passes):  # as surfaces are by then
+            model = replace(model, passes=tuple(stage.items[0] for stage in self.solver.contacts))
         finished = Finished(
             scene=ready.scene,
             meshes=ready.meshes,
-            model=ready.model,
+            model=model,
             start=ready.start,
             ledger=self.ledger,
             steps_taken=self.state.steps,
