@@ -86,7 +86,7 @@ TABLES = {
 
 
 def register(thing: Thing, *, kind: str | None = None) -> Thing:
-    """Add a material, criterion of failure, law, joint, load, cell type, element, phase or recorder to those the package knows.
+    """Add a kind of what `TABLES` lists to those the package knows.
 
     Its name is that of its class, or its attribute `name` where the table holds objects (elements, cell types). It can
     be used as a decorator of a class. A class that is read again from the same module replaces itself.

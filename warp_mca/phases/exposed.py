@@ -113,7 +113,8 @@ class Exposed:
         return alive[first : first + self._ready.meshes[body].cell_count]
 
     def _skins(self, alive: Mask) -> dict[str, Index]:
-        return {name: exposure.skin(self._own(name, alive))[0] for name, exposure in self._faces.items()}
+        found = {name: exposure.skin(self._own(name, alive))[0] for name, exposure in self._faces.items()}
+        return {name: faces for name, faces in found.items() if len(faces)}  # of others nothing is left to pass
 
     def _surface(self, surface: Surface, alive: Mask) -> Faces:
         body = surface.body

@@ -23,6 +23,7 @@ FILES = (
     "material",
     "large_strain",
     "metals",
+    "failure",
     "waves",
     "absorbing",
     "tied",

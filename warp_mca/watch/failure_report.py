@@ -49,7 +49,7 @@ def failure_report(
 
 
 def _failed(solver: Solver, state: State, index: int) -> tuple[Index, Index, Array]:
-    """Elements of a scene that failed, in the numbering of the concatenated meshes; steps and place [m] of each then."""
+    """Elements of a scene that failed, as counted in the concatenated meshes; steps and place [m] of each then."""
     element, steps, place = [np.zeros(0, int)], [np.zeros(0, int)], [np.zeros((0, 3))]
     model = solver.model
     for stage, (first, end) in zip(solver.elements, solver.layout.elements[index].tolist(), strict=True):
