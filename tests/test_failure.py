@@ -55,6 +55,35 @@ def test_contact_follows_the_new_surface_and_the_ledger_closes(through):
     assert through.F_n[late].max() > 0.1 * through.F_n.max()  # the layer below, after the first element failed
 
 
+def test_recorders_show_the_hole(tmp_path):
+    """The surface that VTK, USD and meshio get has as many faces as the cells that are left have free ones."""
+    h5py, meshio = pytest.importorskip("h5py"), pytest.importorskip("meshio")
+    usd = pytest.importorskip("pxr.Usd")
+    from pxr import UsdGeom
+
+    from warp_mca.recorders import FinalState, RerunStream, UsdFile, VtkHdfFile
+    from warp_mca.recorders.recorder import Cadence
+
+    files = {name: tmp_path / f"o.{name}" for name in ("vtkhdf", "usdc", "rrd", "vtu")}
+    cadence = Cadence(frames=3)
+    recorders = [make(files[name], cadence=cadence) for name, make in (("vtkhdf", VtkHdfFile), ("usdc", UsdFile))]
+    recorders += [FinalState(files["vtu"]), RerunStream(files["rrd"], cadence=cadence)]
+    result = mca.run(pierced(duration=1e-5), recorders=recorders)
+    assert result.failed == ()
+    failed = result.summary["failure"]["plate"]["elements"]
+    root = h5py.File(files["vtkhdf"])["VTKHDF"]
+    hidden = root["CellData/vtkGhostType"][:].reshape(3, -1)
+    assert (hidden != 0).sum(axis=1)[[0, -1]].tolist() == [0, failed]
+    (cells,) = (block.data for block in meshio.read(files["vtu"]).cells)
+    assert len(cells) == hidden.shape[1] - failed
+    plate = cells[(cells < 13 * 13 * 3).all(axis=1)]
+    free = mca.Mesh(np.zeros((13 * 13 * 3, 3)), plate.astype(np.int32)).boundary[0]
+    skin = UsdGeom.Mesh(usd.Stage.Open(str(files["usdc"])).GetPrimAtPath("/World/plate"))
+    counts = [len(skin.GetFaceVertexCountsAttr().Get(time)) for time in range(3)]
+    assert counts[0] == 2 * 144 + 4 * 24
+    assert counts[-1] == len(free) != counts[0]
+
+
 def test_momentum_is_kept_as_elements_fail():
     impact = begun(pierced(), duration=1e-5)
     model = impact.solver.model

@@ -47,6 +47,14 @@ class Exposure:
         kept, (more, behind) = alive[owner], self.bare(alive)
         return np.concatenate([node[kept], more]), np.concatenate([owner[kept], behind])
 
+    def possible(self) -> tuple[Index, Index]:
+        """All faces of the boundary and inner ones, both sides of each: nodes, shape (face_count, 4), int32, the cell
+        that each bounds and the one on its other side, or -1, shape (face_count, 2), int32."""
+        node, owner = self.mesh.boundary
+        outer = np.column_stack([owner, np.full(len(owner), -1, np.int32)])
+        inner = np.column_stack(self._inner[1:])
+        return np.concatenate([node, self._inner[0]]), np.concatenate([outer, inner]).astype(np.int32)
+
     def all_faces(self, name: str) -> tuple[Index, Index]:
         """Faces of the set `name` and all inner ones, both sides of each, as `surface`."""
         node, owner = self.mesh.surface(name)

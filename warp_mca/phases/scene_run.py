@@ -165,8 +165,6 @@ class SceneRun:
         if self.solver.layout.count > 1:
             more["batch"] = {"scene": self.index, "scenes": self.solver.layout.count}
         more |= {"bodies": body_report(scene.bodies, self.ready.meshes), **mass_report(scene, model)}
-        if model.fails:
-            more["failure"] = failure_report(scene, self.ready.meshes, self.solver, self.state, self.index)
         if ledger.absorbs:
             more["absorbed_impulse"] = self.solver.absorbing.impulses(self.state, self.index)
         if any(model.penalties):
@@ -221,9 +219,14 @@ class SceneRun:
         return found
 
     def _solver_facts(self) -> dict[str, object]:
-        """Threads that compute, and whether they do so in floating frames."""
-        framed: dict[str, object] = {"floating_frames": True} if self.ledger.framed else {}
-        return {"threads": self.solver.threads, **framed}
+        """Threads that compute, whether they do so in floating frames, and which elements failed."""
+        found: dict[str, object] = {"threads": self.solver.threads}
+        if self.ledger.framed:
+            found["floating_frames"] = True
+        if self.ready.model.fails:
+            meshes = self.ready.meshes
+            found["failure"] = failure_report(self.ready.scene, meshes, self.solver, self.state, self.index)
+        return found
 
     def _extremes(self) -> dict[str, float]:
         """Of single steps, whatever the output interval."""
