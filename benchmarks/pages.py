@@ -34,6 +34,7 @@ PAGES = (
     "tutorials/study.ipynb",
     "tutorials/material.md",
     "how-to/materials.md",
+    "how-to/failure.md",
     "how-to/rigid_plane.md",
     "how-to/boundary.md",
     "how-to/units.md",

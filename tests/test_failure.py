@@ -78,7 +78,8 @@ def test_recorders_show_the_hole(tmp_path):
     assert len(cells) == hidden.shape[1] - failed
     plate = cells[(cells < 13 * 13 * 3).all(axis=1)]
     free = mca.Mesh(np.zeros((13 * 13 * 3, 3)), plate.astype(np.int32)).boundary[0]
-    skin = UsdGeom.Mesh(usd.Stage.Open(str(files["usdc"])).GetPrimAtPath("/World/plate"))
+    stage = usd.Stage.Open(str(files["usdc"]))
+    skin = UsdGeom.Mesh(stage.GetPrimAtPath("/World/plate"))
     counts = [len(skin.GetFaceVertexCountsAttr().Get(time)) for time in range(3)]
     assert counts[0] == 2 * 144 + 4 * 24
     assert counts[-1] == len(free) != counts[0]
