@@ -9,7 +9,7 @@ import pytest
 from impacts import begun
 
 import warp_mca as mca
-from warp_mca.base.errors import RequestError
+from warp_mca.base.errors import GuardError, RequestError
 from warp_mca.scene.failure import FAILURES, StrainFailure
 from warp_mca.scene.model_file import load, save
 from warp_mca.verify.failure import LENGTH, pulled
@@ -221,3 +221,38 @@ def test_a_criterion_from_outside():
             assert bool(result.summary["failure"]["bar"]["elements"]) == fails
     finally:
         del FAILURES["OwnFailure"]
+
+
+def test_a_run_stops_where_nothing_is_left_of_a_surface():
+    """A brittle block bursts as a whole on a wall."""
+    block = mca.Box(size=(2e-3, 2e-3, 2e-3), divisions=(1, 1, 1))
+    glass = replace(STEEL, failure=mca.PrincipalStressFailure(stress=1e6))
+    wall = mca.RigidPlane(point=(0.0, 0.0, 0.0), normal=(0.0, 0.0, 1.0))
+    body = mca.Body(name="block", geometry=block, material=glass, velocity=(0.0, 0.0, -20.0))
+    contact = mca.Contact(slave=mca.Surface(body="block", nodes="boundary"), master=wall)
+    impact = mca.ImpactPhase(duration=1e-5, output_interval=1e-7)
+    with pytest.raises(GuardError, match="all elements at the surface boundary of body block have failed"):
+        mca.run(mca.Scene(name="burst", bodies=(body,), contacts=(contact,), impact=impact))
+
+
+def test_the_watch_looks_at_parts_that_holes_have_made():
+    """A cube has no case of its own before a hole opens in it; what was seen of others stays."""
+    scene = pierced(600.0)
+    cube = mca.Box(size=(0.012, 0.012, 0.006), divisions=(6, 6, 3), origin=(-0.006, -0.006, -0.006))
+    scene = replace(scene, bodies=(replace(scene.bodies[0], geometry=cube), scene.bodies[1]))
+    impact = begun(scene, duration=8e-6)
+    (watch,) = impact._watches
+    before = [case.key for case in watch.cases]
+    impact.advance()
+    assert impact.stopped == [None]
+    assert {case.key for case in watch.cases} > set(before)
+    assert len(impact.state.scenes[0].passed) == len(watch.cases)
+
+
+@pytest.mark.gpu
+def test_a_gpu_pierces_the_plate_alike(through):
+    found = mca.run(pierced(), device="cuda:0")
+    assert found.summary["energy_error"] < 2e-3
+    assert found.summary["failure"]["plate"]["elements"] == pytest.approx(
+        through.summary["failure"]["plate"]["elements"], rel=0.1
+    )

@@ -123,8 +123,8 @@ class Impact:
         Raises:
             RequestError: as in `State.load`.
         """
-        if self.exposed and Path(path).is_file() and (skins := self.exposed.restore(path)):
-            self._watches[0].renew(skins)
+        if self.exposed and Path(path).is_file() and (skins := self.exposed.restore(path)) is not None:
+            self._watches[0].renew(skins, self.exposed.passes, np.zeros((0, 6)))
         self.state.load(path, self.solver.model, self.solver.dt)
         self.stopped = [None] * len(self.ready)
         self._begin_scenes()

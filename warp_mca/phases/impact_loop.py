@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import warp as wp
 
+from warp_mca.base.errors import GuardError
 from warp_mca.step.stage import Search
 from warp_mca.step.steps import Part
 from warp_mca.step.transfer import Transfer
@@ -89,10 +90,15 @@ class Loop:
     def _renew(self) -> None:
         """Let contact and looks follow the surface of elements that failed since the last time."""
         exposed = self.impact.exposed
-        skins = exposed.renew() if exposed else None
-        if skins:
+        try:
+            skins = exposed.renew() if exposed else None
+        except GuardError as error:
+            self.impact.stopped[0] = str(error)
+            raise
+        if exposed and skins is not None:
             self.looks.finish()
-            self.impact.scene_runs[0].looks.watch.renew(skins)
+            looks, kept = self.impact.scene_runs[0].looks, self.state.scenes[0]
+            kept.passed = looks.watch.renew(skins, exposed.passes, kept.passed)
             self.looks = self._looks()
 
     def _looks(self) -> Looks:
