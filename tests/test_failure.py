@@ -180,6 +180,13 @@ def test_what_does_not_go_with_failure_is_refused():
             replace(scene, **more)
     with pytest.raises(RequestError, match=r"multi_rate.*may fail"):
         mca.run(scene, multi_rate=2)
+    link = mca.make_scene("single_link")
+    weak = replace(STEEL, failure=mca.PrincipalStressFailure(stress=1e9))
+    link = replace(link, bodies=tuple(replace(body, material=weak) for body in link.bodies))
+    with pytest.raises(RequestError, match=r"pure-fem.*may fail"):
+        mca.run(link, method="pure-fem")
+    with pytest.raises(RequestError, match=r"t_end.*cannot become rigid again"):
+        replace(link, t_end=1.0)
     tets = tuple(replace(body, element="tet4") for body in scene.bodies)
     with pytest.raises(RequestError, match=r"tet4.*cannot fail"):
         mca.run(replace(scene, bodies=tets))
