@@ -71,7 +71,7 @@ def faces_between(cells: Mapping[str, Index]) -> tuple[Index, Index, Index]:
     opposite = np.full(len(node), -1)
     opposite[one], opposite[other] = owner[other], owner[one]
     inner = opposite >= 0
-    return tuple(part[inner].astype(np.int32) for part in (node, owner, opposite))
+    return node[inner].astype(np.int32), owner[inner].astype(np.int32), opposite[inner].astype(np.int32)
 
 
 def _overlapping(nodes: Index, owner: Index, group: NDArray, count: NDArray) -> Index:

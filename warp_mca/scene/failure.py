@@ -187,7 +187,7 @@ def check_failure(owner: str, failure: object, flows: bool) -> None:
     """
     if failure is None:
         return
-    if type(failure) not in FAILURES.values():
+    if not isinstance(failure, Failure) or type(failure) not in FAILURES.values():
         remedy = f"give {' or '.join(FAILURES)}; register other classes by warp_mca.register"
         raise bad_value(f"{owner}.failure", validate.brief(failure), remedy)
     if failure.plastic and not flows:
