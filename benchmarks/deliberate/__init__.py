@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from benchmarks.deliberate.catches import CATCHES
 from benchmarks.deliberate.element_mutations import ELEMENT_MUTATIONS
+from benchmarks.deliberate.failure_mutations import FAILURE_MUTATIONS
 from benchmarks.deliberate.mutation import Mutation
 from benchmarks.deliberate.rigid_mutations import RIGID_MUTATIONS
 
@@ -316,7 +317,7 @@ MUTATIONS: dict[str, Mutation] = {
     ),
 } | ELEMENT_MUTATIONS
 
-MUTATIONS |= RIGID_MUTATIONS
+MUTATIONS |= RIGID_MUTATIONS | FAILURE_MUTATIONS
 
 
 def notes() -> dict[str, str]:
