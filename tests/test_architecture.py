@@ -17,6 +17,7 @@ from test_style import entries
 import warp_mca as mca
 from warp_mca.physics.absorbing.stage import AbsorbingState
 from warp_mca.physics.contact.contact_state import ContactState
+from warp_mca.physics.elements.failing import FailureState
 from warp_mca.physics.elements.state import ElementState
 from warp_mca.physics.floating.frames import with_floating_frames
 from warp_mca.physics.floating.stage import FloatingState
@@ -139,7 +140,11 @@ def test_stages_of_a_step_are_those_of_the_page_in_this_order():
     pinned = replace(everything(), joints=(pin,))
     seen = set()
     turning = with_floating_frames(prepared(pinned).model, [pinned], 1.0, "mixed")
-    for model in (prepared(everything()).model, turning, chain_ready(driven).model):
+    weak = replace(STEEL, failure=mca.PrincipalStressFailure(stress=1e9))
+    (driven_body,) = (body for body in everything().bodies if body.name == "driven")
+    lone = mca.Scene(name="failing", bodies=(replace(driven_body, material=weak),), impact=everything().impact)
+    failing = prepared(lone).model
+    for model in (prepared(everything()).model, turning, chain_ready(driven).model, failing):
         solver = Solver(model, device="cpu", precision="mixed", dt=1e-8)
         found = [
             [str(number), stage.name, stage.stream, "with a record" if stage.only_records else "all"]
@@ -154,6 +159,7 @@ def test_stages_of_a_step_are_those_of_the_page_in_this_order():
 STATE_PARTS = {
     "": State,
     "elements/0/": ElementState,
+    "elements/0/failing/": FailureState,
     "contacts/0/": ContactState,
     "constraints/": ConstraintState,
     "couplings/": CouplingState,

@@ -16,7 +16,7 @@ NO_TURN = (0.0, 0.0, 0.0)
 
 
 def skin(mesh: Mesh, centre: tuple[float, ...] = NO_TURN, turn: tuple[float, ...] = NO_TURN) -> Skin:
-    found = Skin("it", mesh, mesh.points, 0)
+    found = Skin("it", mesh.boundary[0], mesh.points, 0)
     found.move(Rotation.from_rotvec(turn).apply(mesh.points[found.nodes]) + np.asarray(centre))
     return found
 

@@ -55,6 +55,12 @@ from warp_mca.scene import (
     library,
 )
 from warp_mca.scene.elastic import Elastic
+from warp_mca.scene.failure import (
+    JohnsonCookFailure,
+    PlasticStrainFailure,
+    PrincipalStrainFailure,
+    PrincipalStressFailure,
+)
 from warp_mca.scene.foams import CrushableFoam
 from warp_mca.scene.metals import Chaboche, CowperSymonds, J2Bilinear, J2Table, J2Voce, JohnsonCook
 from warp_mca.scene.rubbers import MooneyRivlin, NeoHookean, Ogden
@@ -119,6 +125,10 @@ __all__ = [
     "Ogden",
     "Prony",
     "CrushableFoam",
+    "PlasticStrainFailure",
+    "JohnsonCookFailure",
+    "PrincipalStressFailure",
+    "PrincipalStrainFailure",
     "library",
     "Contact",
     "ContactAll",

@@ -69,6 +69,7 @@ class Table(NamedTuple):
 # By the word that `kind` takes.
 TABLES = {
     "material": Table("warp_mca.scene.materials", "MATERIALS", ("warp_mca.scene.materials", "Elastic")),
+    "failure": Table("warp_mca.scene.failure", "FAILURES", ("warp_mca.scene.failure", "Failure")),
     "contact law": Table("warp_mca.scene.contact_laws", "CONTACT_LAWS", ("warp_mca.scene.contact_laws", "ContactLaw")),
     "friction law": Table(
         "warp_mca.scene.friction_laws", "FRICTION_LAWS", ("warp_mca.scene.friction_laws", "FrictionLaw")
@@ -85,13 +86,13 @@ TABLES = {
 
 
 def register(thing: Thing, *, kind: str | None = None) -> Thing:
-    """Add a material, law, joint, load, cell type, element, phase or recorder to those the package knows.
+    """Add a kind of what `TABLES` lists to those the package knows.
 
     Its name is that of its class, or its attribute `name` where the table holds objects (elements, cell types). It can
     be used as a decorator of a class. A class that is read again from the same module replaces itself.
 
     Args:
-        thing: a class made of `scene.materials.Elastic`, `scene.contact_laws.ContactLaw`,
+        thing: a class made of `scene.materials.Elastic`, `scene.failure.Failure`, `scene.contact_laws.ContactLaw`,
             `scene.friction_laws.FrictionLaw`, `scene.joints.Joint` or `scene.loads.Load`; a class with the methods of
             `recorders.Recorder`, or with the method `advance(impact, tell)` of a phase before the impact
             (`phases.stretch`); an object with the attributes of `physics.elements.Element`; a

@@ -8,6 +8,7 @@ from __future__ import annotations
 from benchmarks.deliberate.catches import CATCHES
 from benchmarks.deliberate.damping_mutations import DAMPING_MUTATIONS
 from benchmarks.deliberate.element_mutations import ELEMENT_MUTATIONS
+from benchmarks.deliberate.failure_mutations import FAILURE_MUTATIONS
 from benchmarks.deliberate.load_mutations import LOAD_MUTATIONS
 from benchmarks.deliberate.mutation import Mutation
 from benchmarks.deliberate.rigid_mutations import RIGID_MUTATIONS
@@ -318,7 +319,7 @@ MUTATIONS: dict[str, Mutation] = {
     ),
 } | ELEMENT_MUTATIONS
 
-MUTATIONS |= RIGID_MUTATIONS | LOAD_MUTATIONS | DAMPING_MUTATIONS
+MUTATIONS |= RIGID_MUTATIONS | LOAD_MUTATIONS | DAMPING_MUTATIONS | FAILURE_MUTATIONS
 
 
 def notes() -> dict[str, str]:

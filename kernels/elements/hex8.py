@@ -11,6 +11,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.elements.failure import failure_kernel as failure_of
 from warp_mca.kernels.elements.formulation import MEAN, Formulation
 from warp_mca.kernels.elements.hex8_points import points_force_kernel
 from warp_mca.kernels.elements.hex8_small import small_strain_function
@@ -129,3 +130,4 @@ def formulation(precision: str, law_name: str, finite: bool) -> Formulation:
 
 
 energy_kernel, stress_kernel = partial(energy_of, formulation), partial(stress_of, formulation)
+failure_kernel = partial(failure_of, formulation)

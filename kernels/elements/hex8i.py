@@ -10,6 +10,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.elements import hex8i_points, hex8i_vectors
+from warp_mca.kernels.elements.failure import failure_kernel
 from warp_mca.kernels.elements.formulation import OWN, Formulation
 from warp_mca.kernels.elements.hex8i_small import elastic_function, plastic_tractions_function, stress_function
 from warp_mca.kernels.elements.hexahedron import load_function, store_function
@@ -204,6 +205,7 @@ def kernels(points: int) -> SimpleNamespace:
         force_kernel=partial(force_kernel, points),
         energy_kernel=partial(energy_kernel, maker),
         stress_kernel=partial(stress_kernel, maker),
+        failure_kernel=partial(failure_kernel, maker),
         kept=lambda law, finite: hex8i_vectors.KEPT if keeps_vectors(law, finite) else (),
         lags=lags,
     )

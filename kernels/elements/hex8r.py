@@ -12,6 +12,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.base.errors import bad_value
+from warp_mca.kernels.elements.failure import failure_kernel as failure_of
 from warp_mca.kernels.elements.formulation import OWN, Formulation
 from warp_mca.kernels.elements.hexahedron import load_function, store_function
 from warp_mca.kernels.elements.hourglass import AMPLITUDE_ROWS, KEPT, amplitude_functions, hourglass_function
@@ -35,7 +36,7 @@ from warp_mca.kernels.records.extremes import keep_functions
 
 wp.set_module_options({"enable_backward": False})
 
-__all__ = ["energy_kernel", "force_kernel", "kept", "stress_function", "stress_kernel"]
+__all__ = ["energy_kernel", "failure_kernel", "force_kernel", "kept", "stress_function", "stress_kernel"]
 
 
 def kept(law: Law, finite: bool) -> tuple[str, ...]:
@@ -230,3 +231,4 @@ def formulation(precision: str, law_name: str, finite: bool) -> Formulation:
 
 
 energy_kernel, stress_kernel = partial(energy_of, formulation), partial(stress_of, formulation)
+failure_kernel = partial(failure_of, formulation)

@@ -12,6 +12,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.elements.failure import failure_kernel
 from warp_mca.kernels.elements.formulation import MEAN, OWN, Formulation, Maker, parts_of
 from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.kernels.elements.readings import energy_kernel, stress_kernel
@@ -280,10 +281,12 @@ class Kernels:
     force_kernel: Any
     energy_kernel: Any
     stress_kernel: Any
+    failure_kernel: Any
 
 
 @cache
 def kernels(name: str, mean: bool) -> Kernels:
     """Those of an element of this name, with the pressure of the `mean` dilatation or of each point."""
     maker = partial(formulation, name=name, pressure=MEAN if mean else OWN)
-    return Kernels(*(partial(make, maker) for make in (tet10_force_kernel, energy_kernel, stress_kernel)))
+    makers = (tet10_force_kernel, energy_kernel, stress_kernel, failure_kernel)
+    return Kernels(*(partial(make, maker) for make in makers))

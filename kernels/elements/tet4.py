@@ -10,6 +10,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.elements.failure import failure_kernel as failure_of
 from warp_mca.kernels.elements.formulation import NODAL, Formulation
 from warp_mca.kernels.elements.fused import fused
 from warp_mca.kernels.elements.patterns import mean_frame
@@ -221,3 +222,4 @@ def tetrahedron(precision: str, law_name: str, finite: bool, name: str, pressure
 
 formulation = partial(tetrahedron, name="tet4", pressure=NODAL)
 energy_kernel, stress_kernel = partial(energy_of, formulation), partial(stress_of, formulation)
+failure_kernel = partial(failure_of, formulation)

@@ -8,6 +8,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.kernels.elements.failure import failure_kernel as failure_of
 from warp_mca.kernels.elements.formulation import OWN, Formulation
 from warp_mca.kernels.elements.readings import energy_kernel as energy_of
 from warp_mca.kernels.elements.readings import stress_kernel as stress_of
@@ -23,7 +24,7 @@ from warp_mca.kernels.records.extremes import LAG_LOSS, keep_functions
 
 wp.set_module_options({"enable_backward": False})
 
-__all__ = ["energy_kernel", "force_kernel", "kept", "lags", "stress_kernel"]
+__all__ = ["energy_kernel", "failure_kernel", "force_kernel", "kept", "lags", "stress_kernel"]
 
 
 def kept(law: Law, finite: bool) -> tuple[str, ...]:
@@ -204,3 +205,4 @@ def force_kernel(precision: str, law_name: str, finite: bool = False, viscous: i
 
 
 energy_kernel, stress_kernel = partial(energy_of, formulation), partial(stress_of, formulation)
+failure_kernel = partial(failure_of, formulation)

@@ -95,6 +95,19 @@ def flow(precision: str) -> Any:
 
 
 @cache
+def temperature(precision: str) -> Any:
+    """The function (history, c) -> T*, which criteria of failure read."""
+    R, row = scalars(precision).real, parameters_type(precision)
+    rows = wp.types.vector(radial.SIZE, R)
+
+    @wp.func
+    def johnson_cook_temperature(h: rows, c: row):
+        return wp.clamp(c[6] + c[7] * h[wp.static(radial.WORK)], R(0.0), R(1.0))
+
+    return johnson_cook_temperature
+
+
+@cache
 def plastic_work(precision: str) -> Any:
     """Of the history."""
     return radial.kept_work(precision, parameters_type(precision))

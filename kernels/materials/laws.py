@@ -26,6 +26,7 @@ HYPERELASTIC = ("parameters", "mandel", "stored")
 VISCOUS = ("parameters", "deviatoric", "energies")
 GENERAL = ("parameters", "stress", "energies")
 FAMILIES = {"mandel": HYPERELASTIC, "deviatoric": VISCOUS, "stress": GENERAL, "flow": RATED, "return_map": FLOW}
+OPTIONAL = ("temperature",)
 
 
 def row_count(history: tuple[str, ...]) -> int:
@@ -66,6 +67,8 @@ class Law:
             `Body.kinematics` is finite; the stress is the one conjugate to it. The history is a vector of the law's
             rows, 0 at first. dt [s] is the time since the history was kept; 0 asks for the stress of the history as it
             stands.
+        temperature: of a law with heat, may be left out: (history, c) -> T*, from 0 where nothing softens to 1 where
+            it melts.
         energies: of a general or viscous law: (strain, history, c) -> (stored, dissipated), with the history that
             `stress` or `deviatoric` gave; of a viscous law without the energy of the pressure.
         history: kinds of what each point keeps, out of `ROWS`; HISTORY of the module of a rated, viscous or general
@@ -87,6 +90,7 @@ class Law:
     deviatoric: Any = None
     stress: Any = None
     energies: Any = None
+    temperature: Any = None
     history: tuple[str, ...] = ()
     elliptic: bool = False
     relaxes: bool = False
@@ -146,7 +150,8 @@ def law_functions(name: str, precision: str) -> Law:
         path, *given = name.split(":")
         module = import_module(path)
         key = next((key for key in FAMILIES if hasattr(module, key)), "return_map")
-        made = {each: getattr(module, each)(precision, *given) for each in FAMILIES[key]}
+        optional = [each for each in OPTIONAL if hasattr(module, each)]
+        made = {each: getattr(module, each)(precision, *given) for each in (*FAMILIES[key], *optional)}
         history = _history(module, key, given)
         elliptic = getattr(module, "elliptic", lambda *_given: key in ("mandel", "stress"))(*given)
         row = row_count(FLOW_HISTORY) - 1 if key in ("flow", "return_map") else getattr(module, "PLASTIC_ROW", -1)

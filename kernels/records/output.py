@@ -48,6 +48,55 @@ def nodal_stress(
 
 
 @wp.kernel(enable_backward=False)
+def mark_failed(age: wp.array(dtype=wp.int32), first: int, failed_out: wp.array(dtype=wp.int32)):
+    """1 for elements that have failed, whose `age` is below 0, from entry `first` on."""
+    e = wp.tid()
+    failed_out[first + e] = wp.where(age[e] < 0, 1, 0)
+
+
+@wp.kernel(enable_backward=False)
+def leave_out_failed(
+    age: wp.array(dtype=wp.int32),
+    element: wp.array(dtype=wp.int32),
+    corners: int,
+    first: int,
+    stress_out: wp.array2d(dtype=wp.float32),
+):
+    """Mark corners of failed elements, from `first` on, so that means at nodes leave them out."""
+    item = wp.tid()
+    if age[element[item]] < 0:
+        for a in range(corners):
+            stress_out[6, first + corners * item + a] = wp.float32(-1.0)
+
+
+@wp.kernel(enable_backward=False)
+def stress_of_whole(
+    offset: wp.array(dtype=wp.int32),
+    slot: wp.array(dtype=wp.int32),
+    stress: wp.array2d(dtype=wp.float32),
+    tensor_out: wp.array(dtype=vec6),
+    von_mises_out: wp.array(dtype=wp.float32),
+    plastic_out: wp.array(dtype=wp.float32),
+):
+    """As `nodal_stress`, of elements that have not failed."""
+    i = wp.tid()
+    total = vec6()
+    plastic = wp.float32(0.0)
+    count = wp.float32(0.0)
+    for j in range(offset[i], offset[i + 1]):
+        c = slot[j]
+        if stress[6, c] >= wp.float32(0.0):
+            for k in range(6):
+                total[k] = total[k] + stress[k, c]
+            plastic += stress[6, c]
+            count += wp.float32(1.0)
+    count = wp.max(count, wp.float32(1.0))
+    tensor_out[i] = total / count
+    von_mises_out[i] = von_mises(total / count)
+    plastic_out[i] = plastic / count
+
+
+@wp.kernel(enable_backward=False)
 def positions(
     X: wp.array(dtype=wp.vec3d),
     u: wp.array(dtype=wp.vec3d),

@@ -46,6 +46,34 @@ def boundary_faces(cells: Mapping[str, Index], node_count: int) -> tuple[Index, 
     return nodes[own].astype(np.int32), owner[own].astype(np.int32), _overlapping(nodes, owner, group, count)
 
 
+def faces_between(cells: Mapping[str, Index]) -> tuple[Index, Index, Index]:
+    """Faces between two cells, both sides of each, in the order of the cells.
+
+    Returns:
+        Nodes, oriented outwards, shape (face_count, 4), triangles with their last corner twice; the cell that each
+        bounds, and the one on its other side, shape (face_count,); all int32.
+    """
+    faces, owners, first = [], [], 0
+    for name, conn in cells.items():
+        table = CELL_TYPES[name].quads
+        found = _triangles_last(conn[:, table].reshape(-1, 4))
+        kept = found[:, 1] != found[:, 2]
+        faces.append(found[kept])
+        owners.append((first + np.repeat(np.arange(len(conn)), len(table)))[kept])
+        first += len(conn)
+    node, owner = np.concatenate(faces), np.concatenate(owners)
+    key = node.copy()
+    key[is_triangle(node), 3] = -1
+    key = np.sort(key, axis=1)
+    order = np.lexsort(key.T[::-1])
+    same = (key[order[1:]] == key[order[:-1]]).all(axis=1)
+    one, other = order[:-1][same], order[1:][same]
+    opposite = np.full(len(node), -1)
+    opposite[one], opposite[other] = owner[other], owner[one]
+    inner = opposite >= 0
+    return node[inner].astype(np.int32), owner[inner].astype(np.int32), opposite[inner].astype(np.int32)
+
+
 def _overlapping(nodes: Index, owner: Index, group: NDArray, count: NDArray) -> Index:
     """The first two cells on the same side of a face, of faces in groups with the same corners."""
     shared = np.flatnonzero(count[group] > 1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from warp_mca.geometry.cell_types import CELL_TYPES
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.kernels.elements.viscosity import HEATED, VISCOUS
+from warp_mca.model.failing import Failing, criterion_of, failing_of
 from warp_mca.model.stable_step import Elements, StableStep, at_elements, element_steps, stable_step
 from warp_mca.model.viscosity import thermal_strains, viscosities
 from warp_mca.physics.contact.stiffness import Inertia
@@ -57,6 +59,7 @@ class Block:
             element_count), float64; None without bulk viscosity. Heated elements have it, of 0 if no other.
         thermal: number of each element's thermal strain among those of `Model.loads`, -1 without, and volume [m^3],
             shape (2, element_count), float64; None where no element has one.
+        failing: how they fail, or None where they never do.
     """
 
     element: str
@@ -69,6 +72,7 @@ class Block:
     part_ends: tuple[int, ...] = ()
     viscosity: Array | None = None
     thermal: Array | None = None
+    failing: Failing | None = None
 
     def part(self, element: NDArray[np.intp]) -> Block:
         """A block of some of the elements by themselves."""
@@ -76,7 +80,8 @@ class Block:
         thermal = None if self.thermal is None else self.thermal[:, element]
         conn, material = np.ascontiguousarray(self.conn[:, element]), self.material[element]
         more = {"viscosity": viscosity, "thermal": thermal}
-        return replace(self, conn=conn, material=material, **more, first=0, ends=(), part_ends=())
+        found = replace(self, conn=conn, material=material, **more, first=0, ends=(), part_ends=())
+        return replace(found, failing=self.failing and self.failing.part(element))
 
     def without_viscosity(self) -> Block:
         """The block with coefficients of zero, if it has any: its kernels and its `kind` stay."""
@@ -109,9 +114,11 @@ class Block:
         return bool(self.law)
 
     @property
-    def kind(self) -> tuple[bool, str, str, bool, int]:
-        """Key of the block: (not plastic, law, element, finite, joining). Blocks of a model are sorted by it."""
-        return not self.plastic, self.law, self.element, self.finite, self.joining
+    def kind(self) -> tuple[bool, str, str, bool, int, str]:
+        """Key of the block: (not plastic, law, element, finite, joining, criterion of failure). Blocks of a model are
+        sorted by it."""
+        failure = self.failing.law if self.failing else ""
+        return not self.plastic, self.law, self.element, self.finite, self.joining, failure
 
 
 class Assembly:
@@ -198,33 +205,39 @@ class Assembly:
         blocks, order = [], [np.zeros(0, dtype=np.int32)]
         every = [None if rigid else viscosities(self, k) for k in range(len(self.cells))]
         heat = None if rigid else thermal_strains(self)
-        for law in sorted({m.law for m in self.materials}, key=lambda law: (not law, law)):
-            flowing = np.array([m.law == law for m in self.materials])[self.material]
-            for part, viscosity in zip(self.cells, every, strict=True):
-                mine = np.flatnonzero(flowing[part.index] & (self.rigid[part.index] == rigid))
-                if len(mine):
-                    if part.element.patches:
-                        mine = mine[compact_order(self.X, part.conn[mine], PATCH)]
-                    index = part.index[mine]
-                    thermal = None if heat is None or (heat[0, index] < 0).all() else heat[:, index]
-                    own = None if viscosity is None else viscosity[:, mine]
-                    if thermal is not None and own is None:
-                        own = np.zeros((2, len(mine)))
-                    blocks.append(
-                        Block(
-                            element=part.element.name,
-                            law=law,
-                            finite=part.finite,
-                            conn=np.ascontiguousarray(part.conn[mine].T),
-                            material=self.material[index],
-                            first=first,
-                            viscosity=own,
-                            thermal=thermal,
-                        )
-                    )
-                    order.append(index)
-                    first += len(index)
+        laws = sorted({m.law for m in self.materials}, key=lambda law: (not law, law))
+        for law, (k, part), failure in product(laws, enumerate(self.cells), self._criteria(rigid)):
+            alike = [m.law == law and (rigid or criterion_of(m) == failure) for m in self.materials]
+            mine = np.flatnonzero(np.array(alike)[self.material[part.index]] & (self.rigid[part.index] == rigid))
+            if not len(mine):
+                continue
+            if part.element.patches:
+                mine = mine[compact_order(self.X, part.conn[mine], PATCH)]
+            index, viscosity = part.index[mine], every[k]
+            thermal = None if heat is None or (heat[0, index] < 0).all() else heat[:, index]
+            viscosity = None if viscosity is None else viscosity[:, mine]
+            if thermal is not None and viscosity is None:
+                viscosity = np.zeros((2, len(mine)))
+            blocks.append(
+                Block(
+                    element=part.element.name,
+                    law=law,
+                    finite=part.finite,
+                    conn=np.ascontiguousarray(part.conn[mine].T),
+                    material=self.material[index],
+                    first=first,
+                    viscosity=viscosity,
+                    thermal=thermal,
+                    failing=failing_of(failure, self.materials, self.material[index], self.volume[index]),
+                )
+            )
+            order.append(index)
+            first += len(index)
         return tuple(blocks), np.concatenate(order)
+
+    def _criteria(self, rigid: bool) -> list[str]:
+        """Modules of the criteria by which elements fail, "" for those that never do; rigid ones do not."""
+        return [""] if rigid else sorted({criterion_of(m) for m in self.materials})
 
     def stable(self, added: Array, body: str | None = None) -> StableStep:
         """Stable step with what contact springs add to the eigenvalue at each node [1/s^2], of all or of one body."""
@@ -277,9 +290,12 @@ class Assembly:
 
     def faces(self, surface: Surface) -> Faces:
         """Boundary faces of a surface."""
-        node, element = self.meshes[surface.body].surface(surface.nodes)
-        node = (node + self.node_start[surface.body]).astype(np.int32)
-        element = (element + self.element_start[surface.body]).astype(np.int32)
+        return self.faces_of(surface.body, *self.meshes[surface.body].surface(surface.nodes))
+
+    def faces_of(self, body: str, node: Index, element: Index) -> Faces:
+        """Faces of a body, whose nodes and elements are those of its mesh."""
+        node = (node + self.node_start[body]).astype(np.int32)
+        element = (element + self.element_start[body]).astype(np.int32)
         return make_faces(self.X, node, element, self.K, self.G, self.volume * self.face_depth, self.face_height)
 
     def nearest(self, point: Point | None) -> int:

@@ -12,6 +12,7 @@ from warp_mca.base.arrays import Index
 from warp_mca.base.errors import bad_value
 from warp_mca.base.joining import join, offsets
 from warp_mca.model.assembly import Block
+from warp_mca.model.failing import joined
 from warp_mca.model.layout import Layout
 from warp_mca.model.mass_scaling import MassScaling
 from warp_mca.model.model import Model
@@ -48,6 +49,12 @@ def join_models(models: Sequence[Model]) -> Model:
     if len(models) == 1:
         return models[0]
     check_batch([model.loads for model in models])
+    if any(model.fails and model.passes for model in models):
+        remedy = "contact follows it in single runs alone; use run in place of run_batch"
+        raise bad_value("failure of materials", "given", remedy)
+    if len({model.fails for model in models}) > 1:
+        which = f"scenes[{[model.fails for model in models].index(True)}]"
+        raise bad_value(f"failure of materials of {which}", "given", "others have none; run these in batches apart")
     starts = {kind: offsets([count(model) for model in models]) for kind, count in _COUNTS.items()}
     nodes, elements = starts["nodes"], starts["elements"]
     blocks, order, ranges = _blocks(models, nodes, elements)
@@ -113,7 +120,7 @@ def _blocks(models: Sequence[Model], nodes: Index, elements: Index) -> tuple[tup
     blocks, order, first = [], [np.zeros(0, dtype=np.int32)], 0
     ranges = np.zeros((len(models), len(kinds), 2), dtype=np.int32)
     for column, kind in enumerate(kinds):
-        conn, material, viscosity, thermal, end = [], [], [], [], first
+        conn, material, viscosity, thermal, failing, end = [], [], [], [], [], first
         for k, model in enumerate(models):
             ranges[k, column] = end
             for block in model.blocks:
@@ -124,6 +131,7 @@ def _blocks(models: Sequence[Model], nodes: Index, elements: Index) -> tuple[tup
                     viscosity += [] if block.viscosity is None else [block.viscosity]
                     if block.thermal is not None:
                         thermal.append(block.thermal + heated[:, k : k + 1] * (block.thermal >= 0.0))
+                    failing.append(block.failing)
                     order.append(model.element_of[block.first : block.first + count] + elements[k])
                     end += count
             ranges[k, column, 1] = end
@@ -134,6 +142,7 @@ def _blocks(models: Sequence[Model], nodes: Index, elements: Index) -> tuple[tup
                 material=np.concatenate(material),
                 viscosity=np.concatenate(viscosity, axis=1) if viscosity else None,
                 thermal=np.concatenate(thermal, axis=1) if thermal else None,
+                failing=joined(failing),
                 first=first,
                 ends=tuple((ranges[:, column, 1] - first).tolist()),
                 part_ends=(),  # of elements with steps of their own, which batches have not

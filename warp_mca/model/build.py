@@ -17,14 +17,12 @@ from warp_mca.model.model import Model
 from warp_mca.model.own_steps import OwnSteps
 from warp_mca.model.viscosity import share_of_step, with_viscosity
 from warp_mca.physics.absorbing.nodes import absorbing_nodes
-from warp_mca.physics.contact.auto_penalty import ChosenPenalty, settled
+from warp_mca.physics.contact.auto_penalty import ChosenPenalty
 from warp_mca.physics.contact.axes import contact_axes
-from warp_mca.physics.contact.bonds import Place, bonded, on_bonds
-from warp_mca.physics.contact.eigenvalues import contact_eigenvalues
+from warp_mca.physics.contact.bonds import Place, on_bonds
 from warp_mca.physics.contact.general import general_passes
-from warp_mca.physics.contact.resting import resting
-from warp_mca.physics.contact.skin_edges import edge_eigenvalues, edge_pass, is_two_way
-from warp_mca.physics.contact.surfaces import ContactPass, contact_passes
+from warp_mca.physics.contact.listed import as_settled, growth, passes_of
+from warp_mca.physics.contact.surfaces import ContactPass
 from warp_mca.physics.joints.constraints import check_bindings, constraints, free_nodes, join_bodies, nodes_of
 from warp_mca.physics.loads.joint_loads import hinge_loads, movable_bases
 from warp_mca.physics.loads.nodal import LoadedNodes, loaded_nodes
@@ -58,25 +56,16 @@ def _contacts(
             continue
         slave = parts.faces(contact.slave)
         master = None if isinstance(contact.master, RigidPlane) else parts.faces(contact.master)
-        contact = replace(contact, two_way=is_two_way(contact, slave, master))
-        contact, chosen = settled(parts, contact, slave, master, velocity)
+        contact, chosen = as_settled(parts, contact, slave, master, velocity)
         penalties.append(chosen)
-        contact = resting(parts, contact, slave, master, velocity)
-        found = contact_passes(contact, index, slave, master)
-        if index in places:
-            first = parts.node_start[contact.slave.body]
-            found = [bonded(found[0], contact, places[index], first, slave, parts.X)]
-        for item in found:
-            sides = (slave, master) if item.sign > 0.0 else (master, slave)
-            assert sides[0] is not None
-            nodes, value = contact_eigenvalues(item, sides[0], sides[1], parts.mass)
-            np.add.at(added, nodes, bounce_factor(contact, parts.scene) * value)
-            decay = item.damping * float(value.max()) / item.stiffening if item.damping else 0.0
-            passes.append(replace(item, decay=decay))
-        if master is not None and (edges := edge_pass(parts.X, parts.inertia, found[0], slave, master, contact)):
-            nodes, value = edge_eigenvalues(edges, parts.mass)
-            added[nodes] += bounce_factor(contact, parts.scene) * value
-            passes.append(edges)
+        given, factor = (
+            passes_of(parts, contact, index, slave, master, places.get(index)),
+            bounce_factor(contact, parts.scene),
+        )
+        for item, nodes, value in given:
+            np.add.at(added, nodes, factor * value)
+            passes.append(item)
+        added += factor * growth(parts, contact, index, given)
         axes[index] = contact_axes(parts.X, contact, slave, master)
     return tuple(passes), axes, added, tuple(penalties)
 

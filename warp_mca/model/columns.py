@@ -11,6 +11,9 @@ if TYPE_CHECKING:
     from warp_mca.model.model import Model
 
 
+FAILURE = "failure"  # entry of the ledger: elastic and hourglass energy that went with elements that failed
+
+
 class Added(NamedTuple):
     """Columns of one actor: the first, the entries of the ledger to which they add, and what stands behind these.
 
@@ -33,11 +36,13 @@ def pass_count(model: Model) -> int:
 
 
 def added_columns(model: Model) -> dict[str, Added]:
-    """Columns of each actor that adds some, by its name: each kind of loads, then absorbing boundaries.
+    """Columns of each actor that adds some, by its name: loads, elements that may fail, absorbing boundaries.
 
-    All scenes of a batch have the same kinds of loads; those without absorbing boundaries read fewer columns.
+    All scenes of a batch have the same kinds of loads, and elements that may fail or none; those without absorbing
+    boundaries read fewer columns.
     """
     kinds = {kind: (LOADS[kind].energies, _readings(model, kind)) for kind in model.loads}
+    kinds |= {FAILURE: ((FAILURE,), ())} if model.fails else {}
     kinds |= {"absorbing": (model.absorbing.ENERGIES, ())} if len(model.absorbing.node) else {}
     found, first = {}, PASS + PASS_COLUMNS * pass_count(model)
     for name, (energies, readings) in kinds.items():

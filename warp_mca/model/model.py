@@ -130,6 +130,11 @@ class Model:
         return any(block.viscous for block in self.blocks)
 
     @property
+    def fails(self) -> bool:
+        """Whether elements may fail."""
+        return any(block.failing for block in self.blocks)
+
+    @property
     def common_steps(self) -> int:
         """Steps that contacts and joints take in a step of the solver."""
         return self.rates.common_steps if self.rates else 1

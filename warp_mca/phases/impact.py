@@ -1,14 +1,14 @@
-"""Owns the impact phase: a solver, the state that it advances, and the only loop over its steps."""
+"""Owns the impact phase: a solver, and the state that it advances."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import GuardError, bad_value
@@ -18,6 +18,8 @@ from warp_mca.model.batch_model import join_models, with_alike_passes
 from warp_mca.model.paths import join_probes
 from warp_mca.model.sensors import join_sensors
 from warp_mca.phases.division import divide_alike
+from warp_mca.phases.exposed import Exposed
+from warp_mca.phases.impact_loop import Loop
 from warp_mca.phases.initial_overlap import settle_initial_overlap
 from warp_mca.phases.scene_run import SceneRun
 from warp_mca.physics.floating.frames import with_floating_frames
@@ -25,12 +27,8 @@ from warp_mca.step.output import Output
 from warp_mca.step.records import SceneRecords
 from warp_mca.step.sensor_stage import SensorStage
 from warp_mca.step.solver import Solver
-from warp_mca.step.stage import Search
 from warp_mca.step.state import State
-from warp_mca.step.steps import Part, Steps
-from warp_mca.step.transfer import Transfer
-from warp_mca.step.workspace import ROWS
-from warp_mca.watch.looks import Looks
+from warp_mca.step.steps import Steps
 from warp_mca.watch.passing import Watch
 
 if TYPE_CHECKING:
@@ -55,6 +53,7 @@ class Impact:
         scene_runs: records and result of each scene.
         stopped: which guard stopped each scene, in one sentence, or None.
         recording: recorders of a lone scene, or None.
+        exposed: what follows the surface of a lone scene's elements as they fail, or None.
     """
 
     def __init__(
@@ -104,6 +103,7 @@ class Impact:
         if not shape:
             settle_initial_overlap(self.ready, self.solver, self.state)
         self.solver.start(self.state)
+        self.exposed = Exposed(self.ready[0], self.solver, self.state) if model.fails and len(ready) == 1 else None
         self.stopped: list[str | None] = [None] * len(self.ready)
         self.recording: Recording | None = None
         self._watches = [Watch(item.scene, item.meshes, item.model, self.solver.dt, span) for item in ready]
@@ -123,6 +123,8 @@ class Impact:
         Raises:
             RequestError: as in `State.load`.
         """
+        if self.exposed and Path(path).is_file() and (skins := self.exposed.restore(path)) is not None:
+            self._watches[0].renew(skins, self.exposed.passes, np.zeros((0, 6)))
         self.state.load(path, self.solver.model, self.solver.dt)
         self.stopped = [None] * len(self.ready)
         self._begin_scenes()
@@ -176,7 +178,7 @@ class Impact:
         if None not in self.stopped or self.state.steps > self.steps.count:
             return  # with the last record of all
         with suppress(GuardError), few_collections():  # the error is that of the last scene
-            _Loop(self, told, ended).run(until)
+            Loop(self, told, ended).run(until)
 
     def at_last_record(self) -> tuple[Array, Array]:
         """Displacements [m] and velocities [m/s] of the nodes at the last record, each shape (node_count, 3), float64.
@@ -201,100 +203,3 @@ class Impact:
                     self.stopped[k] = str(error)
                     if None not in self.stopped:
                         raise
-
-
-class _Loop:
-    """One call of `Impact.advance`: launches, and records on their way to the host."""
-
-    def __init__(self, impact: Impact, told: Callable[[], None], ended: Callable[[], bool] | None) -> None:
-        self.impact, self.told, self.ended = impact, told, ended
-        self.solver, self.state, self.steps = impact.solver, impact.state, impact.steps
-        with wp.ScopedDevice(self.solver.device):
-            self.solver.work.row.fill_(ROWS - 1)
-        self.transfer = Transfer(self.solver.rings(self.state), self.solver.device)
-        self.looks = Looks(self.solver, self.state, [item.looks for item in impact.scene_runs])
-        self.written = 0
-        if ended:  # each part of the ring is waited for
-            self.solver.replay.note_ahead(self.state)
-
-    def run(self, until: int | None) -> None:
-        """As `Impact.advance`."""
-        last = self.steps.count if until is None else min(until, self.steps.count)
-        interval = self.state.steps // self.steps.per_interval
-        while self.state.steps < last and not self._ends(interval):
-            self._interval(interval, last)
-            interval += 1
-        if until is None or self.state.steps >= self.steps.count:
-            if self.written == ROWS:
-                self._send()
-            self.looks.watch(last=True)
-            self._record(1, self.state.steps // self.steps.per_interval, True)
-        self.looks.finish()
-        if self.written:
-            self._send()
-        if self.impact.recording:
-            self.impact.recording.catch_up(self._receive_arrived)
-        while self.transfer.pending:
-            self._receive()
-
-    def _ends(self, interval: int) -> bool:
-        """Whether the phase ends with this row, by what the rows before it say."""
-        if self.ended is None or self.state.steps != interval * self.steps.per_interval:
-            return False
-        return self.ended()
-
-    def _interval(self, interval: int, last: int) -> None:
-        """The steps of an output interval that are not done yet, up to step `last`."""
-        first = interval * self.steps.per_interval
-        if self.state.steps == first:
-            self.looks.row(interval, self.steps.intervals)
-        for number, part in enumerate(self.steps.parts(interval)):
-            end = first + part.count
-            if self.state.steps < min(end, last):
-                self._part(part, first, min(end, last), interval if number == 0 else None)
-            first = end
-
-    def _part(self, part: Part, first: int, end: int, row: int | None) -> None:
-        """Steps that follow each other without a look from outside, from the present one to `end`."""
-        if self.state.steps == first:  # not interrupted in between
-            self.looks.watch()
-            if part.begins_check and self.written == ROWS:
-                self._send()
-            count = self.looks.until(end - first, part.count)
-            if part.begins_check:
-                self._record(count, row, part.begins_search)
-            elif part.begins_search:
-                self.solver.search(self.state)
-        while self.state.steps < end:
-            if self.state.steps > first:
-                self.looks.watch(part.count)
-            self.solver.step(self.state, self.looks.until(end - self.state.steps, part.count))
-
-    def _record(self, count: int, row: int | None, searches: bool = False) -> None:
-        """Record and step; `row` is the number of the row of the history that the record gives, if it gives one."""
-        recording = self.impact.recording
-        needs: frozenset[str] = recording.needs(row) if recording and row is not None else frozenset()
-        search: Search = ("after" if self.steps.spare else "before") if searches else ""
-        self.solver.record_and_step(self.state, count, needs, row is not None, search)
-        self.written += 1
-        if recording and row is not None:
-            recording.take(row, needs)
-
-    def _send(self) -> None:
-        if self.transfer.full:
-            if self.impact.recording:
-                self.impact.recording.work(lambda: self.transfer.arrived)
-            if not self.transfer.arrived:  # the device has two parts more to compute
-                self.solver.replay.note_ahead(self.state)
-            self._receive()
-        self.transfer.send(self.written)
-        self.written = 0
-        self._receive_arrived()
-
-    def _receive_arrived(self) -> None:
-        while self.transfer.arrived or (self.ended and self.transfer.pending):
-            self._receive()
-
-    def _receive(self) -> None:
-        self.impact.read(*self.transfer.receive())
-        self.told()

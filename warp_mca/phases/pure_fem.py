@@ -67,6 +67,9 @@ def _check(scene: Scene) -> None:
         raise bad_value("method", METHOD, remedy)
     if scene.t_end is not None:
         raise bad_value("Scene.t_end", scene.t_end, f"{METHOD} ends duration after the first touch; leave t_end out")
+    if scene.failing:
+        remedy = "its elements fail in the impact alone; take method mca, or leave the failure of its material out"
+        raise bad_value("method", METHOD, f"body {scene.failing[0]} may fail: {remedy}")
     if scene.prescribed:
         remedy = f"times of a Prescribed velocity count from the touch, which {METHOD} does not know; leave it out"
         raise bad_value("Scene.prescribed", scene.prescribed[0].body, remedy)

@@ -103,10 +103,11 @@ def grouping(scene: Scene, span: float, device: str, multi_rate: MultiRate) -> G
         if multi_rate != "auto":  # the dashpots of bodies at rest, which the program added, take steps of one rate
             model = undamped(model, scene)
         damped = any(item.damping for item in model.passes)
-        if most > 1 and (damped or scene.phases):
+        if most > 1 and (damped or scene.phases or model.fails):
             if multi_rate == "auto":
                 return model
             what = "contact laws with a dashpot" if damped else "phases before the impact"
+            what = "elements that may fail" if model.fails else what
             raise bad_value("multi_rate", multi_rate, f"{what} take steps of one rate; leave it out")
         if not model.element_count or (multi_rate == "auto" and model.element_count < cost_of(device).least):
             return model

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,6 +26,7 @@ from warp_mca.step.state_figures import (
     rigid_bodies,
 )
 from warp_mca.watch.energy import spring_shares
+from warp_mca.watch.failure_report import failure_report
 from warp_mca.watch.ledger import Ledger
 from warp_mca.watch.looks import SceneLooks
 from warp_mca.watch.mass_report import body_report, mass_report
@@ -217,9 +219,14 @@ class SceneRun:
         return found
 
     def _solver_facts(self) -> dict[str, object]:
-        """Threads that compute, and whether they do so in floating frames."""
-        framed: dict[str, object] = {"floating_frames": True} if self.ledger.framed else {}
-        return {"threads": self.solver.threads, **framed}
+        """Threads that compute, whether they do so in floating frames, and which elements failed."""
+        found: dict[str, object] = {"threads": self.solver.threads}
+        if self.ledger.framed:
+            found["floating_frames"] = True
+        if self.ready.model.fails:
+            meshes = self.ready.meshes
+            found["failure"] = failure_report(self.ready.scene, meshes, self.solver, self.state, self.index)
+        return found
 
     def _extremes(self) -> dict[str, float]:
         """Of single steps, whatever the output interval."""
@@ -235,10 +242,13 @@ class SceneRun:
         """What the run says of itself; arguments are fields of `Finished`."""
         ready, nodes = self.ready, self.looks.nodes
         u, v = (np.asarray(field.numpy(), dtype=np.float64) for field in (self.state.u, self.state.v))
+        model = ready.model
+        if model.fails and len(self.solver.contacts) == len(model.passes):  # as surfaces are by then
+            model = replace(model, passes=tuple(stage.items[0] for stage in self.solver.contacts))
         finished = Finished(
             scene=ready.scene,
             meshes=ready.meshes,
-            model=ready.model,
+            model=model,
             start=ready.start,
             ledger=self.ledger,
             steps_taken=self.state.steps,

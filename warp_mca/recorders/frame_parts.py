@@ -18,6 +18,7 @@ NOTHING: dict[str, Any] = {  # what a frame holds that needs nothing
     "points": {},
     "von_mises": {},
     "plastic_strain": {},
+    "faces": {},
     "contact_points": np.zeros((0, 3), np.float32),
     "contact_stick": np.zeros(0, bool),
     "path_stress": {},
@@ -57,6 +58,7 @@ class FrameParts:
 
     def __init__(self, info: RunInfo) -> None:
         self.shift: NDArray[np.float32] | None = None
+        self._element_of, self._skins = info.model.element_of, info.surfaces
         self._cuts = {
             SURFACE: _cuts({body: len(skin.nodes) for body, skin in info.surfaces.items()}),
             PATHS: _cuts({path: len(position) for path, position in info.paths.items()}),
@@ -66,19 +68,33 @@ class FrameParts:
         """What frames hold of the arrays that were sent, by need and the name in `Frame`."""
         parts: dict[str, dict[str, Any]] = {}
         for (need, name), array in sent.items():
+            if name == "failed":
+                continue
             cut = self._cuts.get(need)
             parts.setdefault(need, {})[name] = array if cut is None else {key: array[at] for key, at in cut.items()}
         if CONTACT in parts:
             points, state = (parts[CONTACT][name] for name in ("points", "state"))
             closed = state != OPEN
             parts[CONTACT] = {"contact_points": points[closed], "contact_stick": state[closed] == STICK}
+        if (SURFACE, "failed") in sent:
+            failed = self._failed(sent[SURFACE, "failed"])
+            parts[SURFACE]["faces"] = {
+                body: skin.seen(failed) for body, skin in self._skins.items() if skin.between is not None
+            }
         if PATHS in parts:
             parts[PATHS] = {"path_stress": parts[PATHS]["von_mises"]}
         if VOLUME in parts:
             if self.shift is not None:
                 parts[VOLUME]["displacement"] = parts[VOLUME]["displacement"] + self.shift
-            parts[VOLUME] = {"volume": Volume(**parts[VOLUME])}
+            failed = self._failed(sent[VOLUME, "failed"]) if (VOLUME, "failed") in sent else None
+            parts[VOLUME] = {"volume": Volume(**parts[VOLUME], failed=failed)}
         return parts
+
+    def _failed(self, sent: NDArray[np.int32]) -> NDArray[np.bool_]:
+        """Whether each element of the concatenated meshes has failed, of flags in the model's order."""
+        found = np.zeros(len(self._element_of), dtype=bool)
+        found[self._element_of[: len(sent)]] = sent != 0
+        return found
 
 
 def frame_values(parts: Mapping[str, Mapping[str, Any]], needs: frozenset[str]) -> dict[str, Any]:

@@ -13,6 +13,8 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.base import validate
+from warp_mca.base.arrays import Index
+from warp_mca.geometry.exposure import Exposure
 from warp_mca.recorders.checks import files_of
 from warp_mca.recorders.frame_parts import FrameParts, Times, frame_values, rows_of_phase, wanted_rows
 from warp_mca.recorders.recorder import (
@@ -25,6 +27,7 @@ from warp_mca.step.transfer import SLOTS, Transfer
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
+    from warp_mca.model.assembly import Block
     from warp_mca.model.model import Model
     from warp_mca.step.output import Output
 
@@ -40,12 +43,22 @@ LAST = 3  # frames that are still to come when recorders begin to write each at 
 def skins(model: Model, meshes: Mapping[str, Mesh]) -> dict[str, SurfaceMesh]:
     """The skin of each body in the model's numbering."""
     found = {}
+    failing = np.concatenate([np.zeros(0, int), *(_elements(model, block) for block in model.blocks if block.failing)])
     for body, mesh in meshes.items():
-        quads, _ = mesh.boundary
+        (quads, _), between = mesh.boundary, None
+        start = model.element_start[body]
+        if ((failing >= start) & (failing < start + mesh.cell_count)).any():
+            quads, between = Exposure(mesh).possible()
+            between = np.where(between < 0, -1, between + start).astype(np.int32)
         nodes = np.unique(quads)
         local = np.searchsorted(nodes, quads).astype(np.int32)
-        found[body] = SurfaceMesh((nodes + model.node_start[body]).astype(np.int32), local)
+        found[body] = SurfaceMesh((nodes + model.node_start[body]).astype(np.int32), local, between)
     return found
+
+
+def _elements(model: Model, block: Block) -> Index:
+    """Elements of a block as counted in the concatenated meshes."""
+    return model.element_of[block.first : block.first + block.conn.shape[1]]
 
 
 def _begin(index: int, recorder: Recorder, method: str, info: RunInfo) -> None:

@@ -75,7 +75,7 @@ class FinalState(FramesOnly):
     def frame(self, frame: Frame) -> None:
         """Keep it in place of the one before."""
         assert frame.volume is not None
-        self._fields = {name: np.array(field) for name, field in vars(frame.volume).items()}
+        self._fields = {name: np.array(field) for name, field in vars(frame.volume).items() if field is not None}
 
     def finish(self, ok: bool) -> None:
         """Write the file; after a run that failed there is no final state, and none is written.
@@ -86,6 +86,12 @@ class FinalState(FramesOnly):
         fields, self._fields = self._fields, None
         if ok and fields is not None:
             runs, body, material = cells(self.model)
+            if "failed" in fields:  # are left out
+                left = ~fields.pop("failed")
+                ends = np.cumsum([len(nodes) for _, nodes in runs])[:-1]
+                parts = zip(runs, np.split(left, ends), strict=True)
+                runs = [(cell, nodes[own]) for (cell, nodes), own in parts if own.any()]
+                body, material = body[left], material[left]
             points = self.model.X + fields["displacement"]
             _save(self.path, _mesh(self.path, points, runs, fields, {"body": body, "material": material}))
 

@@ -60,7 +60,13 @@ class Subject:
             found = {body: (frame.points[body].copy(), values[body].copy()) for body in info.surfaces}
         else:
             found = {body: self._from_volume(info, frame, surface.nodes) for body, surface in info.surfaces.items()}
-        return {body: Skin(points, info.surfaces[body].quads, value) for body, (points, value) in found.items()}
+        quads = {body: surface.quads for body, surface in info.surfaces.items()}
+        faces = frame.faces
+        if frame.volume is not None and (failed := frame.volume.failed) is not None:
+            skins = {body: skin for body, skin in info.surfaces.items() if skin.between is not None}
+            faces = {body: skin.seen(failed) for body, skin in skins.items()}
+        quads |= {body: quads[body][seen] for body, seen in faces.items()}
+        return {body: Skin(points, quads[body], value) for body, (points, value) in found.items()}
 
     def look(self, info: RunInfo, skins: Mapping[str, Skin]) -> Look:
         """How they are drawn: bodies that strike, as much of the others as lies around these, and rigid planes."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -114,6 +114,8 @@ class Volume:
         stress: xx, yy, zz, xy, yz, xz in the world frame [Pa], shape (node_count, 6), float32.
         von_mises: [Pa], shape (node_count,), float32.
         plastic_strain: equivalent plastic strain [-], shape (node_count,), float32.
+        failed: whether each element has failed, as counted in the concatenated meshes, shape (element_count,), bool;
+            None where none can.
     """
 
     displacement: Float
@@ -121,6 +123,7 @@ class Volume:
     stress: Float
     von_mises: Float
     plastic_strain: Float
+    failed: NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True)
@@ -141,6 +144,8 @@ class Frame:
         contact_stick: which of them stick, shape (contact_count,), bool.
         path_stress: von Mises stress along each path [Pa], shape (probe_count,), float32, by path.
         volume: fields at all nodes, or None.
+        faces: which faces of its skin are at the surface, of each body whose elements may fail, shape (face_count,),
+            bool, by body.
     """
 
     index: int
@@ -153,6 +158,7 @@ class Frame:
     contact_stick: NDArray[np.bool_]
     path_stress: Mapping[str, Float]
     volume: Volume | None = None
+    faces: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
 
 
 class Recorder(Protocol):

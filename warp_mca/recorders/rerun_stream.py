@@ -88,6 +88,7 @@ class RerunStream:
         self.streams: list[rr.RecordingStream] = []
         self.viewer: Viewer | None = None
         self.frame_count = 0
+        self._seen: dict[str, NDArray[np.bool_]] = {}  # faces of bodies whose elements may fail
         self.failed = False
         self._file: RerunFile | None = None
         self._viewer_stream: rr.RecordingStream | None = None
@@ -141,6 +142,8 @@ class RerunStream:
             log_styles(stream)
             self.planes.log(stream)
             for body, surface in info.surfaces.items():
+                if surface.between is not None:  # with the frames
+                    continue
                 stream.log(self.bodies[body], topology(info, surface.nodes, surface.triangles), static=True)
             for path, item in bars.items():
                 stream.log(self.paths[path], item.once, static=True)
@@ -155,6 +158,7 @@ class RerunStream:
         rescaled = self.scale.include(greatest) or self.frame_count == 0
         for stream in self.streams:
             self._log_beside(stream, frame, rescaled)
+        self._seen = {body: seen.copy() for body, seen in frame.faces.items()}
         self.queue.add(frame, self.scale.limit)
         self.frame_count += 1
         if self.frame_count % FLUSH_EVERY == 0 or time.monotonic() > self._sent + HOLD:
@@ -216,6 +220,12 @@ class RerunStream:
         """Log what few frames change: the legend, and planes that move."""
         from warp_mca.recorders.rerun_blueprint import log_ticks
 
+        for body, seen in frame.faces.items():
+            if not np.array_equal(self._seen.get(body, ()), seen):
+                part = self.info.surfaces[body].part(seen)
+                stream.set_time("sim_time", duration=float(frame.time))
+                stream.set_time("step", sequence=int(frame.step))
+                stream.log(self.bodies[body], topology(self.info, part.nodes, part.triangles))
         if rescaled or self.planes.move_at_all:
             stream.set_time("sim_time", duration=float(frame.time))
             stream.set_time("step", sequence=int(frame.step))

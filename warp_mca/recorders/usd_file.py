@@ -175,7 +175,8 @@ class UsdFile(FramesOnly):
                     self.scale.include(max(float(value.max(initial=0.0)) for value in frame.von_mises.values()))
                     code, limit = Usd.TimeCode(len(self.times)), self.scale.limit
                     for name, body in self.bodies.items():
-                        body.write(code, frame.points[name], frame.von_mises[name], frame.plastic_strain[name], limit)
+                        shown = (frame.points[name], frame.von_mises[name], frame.plastic_strain[name], limit)
+                        body.write(code, *shown, frame.faces.get(name))
                     self.contact.write(code, frame.contact_points, frame.contact_stick)
                     self.setting.write(code, frame.time)
                     self.times.append(frame.time)

@@ -36,14 +36,13 @@ class BodyPrim:
     """A skin as a mesh, with normals that keep sharp edges."""
 
     def __init__(self, mesh: Any, name: str, surface: SurfaceMesh, points: NDArray) -> None:
-        from pxr import Sdf, UsdGeom, Vt
+        from pxr import Sdf, UsdGeom
 
         self.mesh = mesh
         mesh.GetPrim().SetDisplayName(name)
         mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-        mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(surface.corner_counts))
-        corners = surface.quads[np.arange(4) < surface.corner_counts[:, None]]
-        mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(corners)))
+        self.surface, self.seen = surface, np.zeros(0, dtype=bool)
+        counts, corners = mesh.CreateFaceVertexCountsAttr(), mesh.CreateFaceVertexIndicesAttr()
         self.points, self.extent = mesh.CreatePointsAttr(), mesh.CreateExtentAttr()
         self.colour = _colours(mesh, _linear(PALETTE / 255.0))
         primvars = UsdGeom.PrimvarsAPI(mesh)
@@ -52,14 +51,40 @@ class BodyPrim:
             primvars.CreatePrimvar(name, float_array, UsdGeom.Tokens.vertex) for name in ("vonMises", "plasticStrain")
         )
         self.plastic, self.plastic_sum = _Held(plastic), -1.0
-        self.creases = Creases(surface.quads, points)
         normals = primvars.CreatePrimvar("normals", Sdf.ValueTypeNames.Normal3fArray, UsdGeom.Tokens.faceVarying)
-        normals.CreateIndicesAttr().Set(Vt.IntArray.FromNumpy(self.creases.group))
+        self.faces = [counts, corners, normals.CreateIndicesAttr()]
         self.normals = _Held(normals)
+        if surface.between is None:
+            for attribute, value in zip(self.faces, self._topology(surface, points), strict=True):
+                attribute.Set(value)
+        else:
+            self.faces = [_Held(attribute) for attribute in self.faces]
 
-    def write(self, code: Any, points: NDArray, von_mises: NDArray, plastic: NDArray, limit: float) -> None:
+    def _topology(self, surface: SurfaceMesh, points: NDArray) -> list[Any]:
+        """Corners of each face, their vertices, and the group of each of them in the normals."""
         from pxr import Vt
 
+        self.creases = Creases(surface.quads, points)
+        corners = surface.quads[np.arange(4) < surface.corner_counts[:, None]]
+        values = surface.corner_counts, np.ascontiguousarray(corners), self.creases.group
+        return [Vt.IntArray.FromNumpy(value) for value in values]
+
+    def write(
+        self,
+        code: Any,
+        points: NDArray,
+        von_mises: NDArray,
+        plastic: NDArray,
+        limit: float,
+        seen: NDArray[np.bool_] | None = None,
+    ) -> None:
+        """Write a frame; `seen` are the faces at the surface of a body whose elements may fail."""
+        from pxr import Vt
+
+        if seen is not None and seen.any() and not np.array_equal(seen, self.seen):
+            self.seen = seen.copy()
+            for held, value in zip(self.faces, self._topology(self.surface.part(seen), points), strict=True):
+                held.write(code, value)
         _place(self, code, points)
         self.colour.Set(Vt.IntArray.FromNumpy(levels(von_mises, limit).astype(np.int32)), code)
         self.stress.Set(Vt.FloatArray.FromNumpy(_rounded(von_mises)), code)

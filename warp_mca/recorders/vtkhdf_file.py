@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.base.files import nearest
 from warp_mca.pictures.setting import rigid_planes, up_of
+from warp_mca.recorders.hidden_cells import HiddenCells
 from warp_mca.recorders.mesh_file import cells
 from warp_mca.recorders.recorder import DISK_RESERVE, VOLUME, Cadence, FramesOnly, check_disk, check_file
 
@@ -120,6 +121,7 @@ class VtkHdfFile(FramesOnly):
             self._file = h5py.File(_create(self._unborn))
             root = self._file.create_group("VTKHDF")
             self._steps, self._values, self._places = _make_steps(root, count, self.node_count, info.phases)
+            self._hidden = HiddenCells(root, count, len(info.model.element_of)) if info.model.fails else None
             _write_mesh(root, info.model)
             _write_setting(root, info.scene, count)
             self._file.flush()
@@ -164,12 +166,14 @@ class VtkHdfFile(FramesOnly):
             self._abandon()
 
     def _write(self, file: h5py.File, step: int, time: float, fields: Mapping[str, NDArray]) -> None:
-        needed = DISK_RESERVE + sum(field.nbytes for field in fields.values())
+        needed = DISK_RESERVE + sum(field.nbytes for field in fields.values() if field is not None)
         if shutil.disk_usage(self.path.parent).free < needed:
             raise OSError(f"less than {needed >> 20} MiB are free on its disk")
         if self.frame_count == len(self._places["step"]):
             raise OSError(f"it has room for {self.frame_count} frames; take fewer")
         place = slice(self.frame_count * self.node_count, (self.frame_count + 1) * self.node_count)
+        if self._hidden and (failed := fields["failed"]) is not None:
+            self._hidden.write(self.frame_count, failed)
         for name in FIELDS:
             if len(self._places[name]) < place.stop:  # of a run of many phases
                 self._places[name].resize(place.stop, axis=0)

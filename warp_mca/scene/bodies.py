@@ -96,6 +96,12 @@ class Body:
             angular_velocity=self.angular_velocity,
         )
 
+    @property
+    def fails(self) -> bool:
+        """Whether one of its materials has a criterion of failure."""
+        materials = self.material.values() if isinstance(self.material, Mapping) else (self.material,)
+        return any(material.failure for material in materials)
+
     def _check_across(self, across: Vec3) -> None:
         turned = [name for name, element in ELEMENTS.items() if hasattr(element, "oriented")]
         if self.element not in turned:

@@ -14,6 +14,7 @@ from typing import ClassVar
 
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
+from warp_mca.scene.failure import Failure, check_failure
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,6 +25,7 @@ class Elastic:
         E: Young's modulus [Pa].
         nu: Poisson's ratio [-], in (-1, 0.5).
         rho: density [kg/m^3].
+        failure: criterion by which elements of it fail and are removed; None: they never do.
         law: module of its law, with the functions of `kernels.materials.laws`; empty where it never flows.
         finite_only: whether it makes no sense at small strain.
     """
@@ -31,6 +33,7 @@ class Elastic:
     E: float
     nu: float
     rho: float
+    failure: Failure | None = None
     law: ClassVar[str] = ""
     finite_only: ClassVar[bool] = False
 
@@ -39,6 +42,7 @@ class Elastic:
         validate.positive(type(self).__name__, E=self.E, rho=self.rho)
         if not (validate.is_number(self.nu) and -1.0 < self.nu < 0.5):
             raise bad_value(f"{type(self).__name__}.nu", self.nu, "Poisson's ratio must lie in (-1, 0.5)")
+        check_failure(type(self).__name__, self.failure, bool(self.law))
 
     @property
     def bulk_modulus(self) -> float:

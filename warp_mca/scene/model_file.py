@@ -31,6 +31,7 @@ from warp_mca.scene import Scene
 from warp_mca.scene.bodies import Body
 from warp_mca.scene.catalogue import load_source
 from warp_mca.scene.contact_laws import CONTACT_LAWS
+from warp_mca.scene.failure import FAILURES
 from warp_mca.scene.friction_laws import FRICTION_LAWS
 from warp_mca.scene.joints import JOINTS
 from warp_mca.scene.loads import LOADS
@@ -204,7 +205,7 @@ def changed(stored: StoredModel, overrides: Mapping[str, object]) -> StoredModel
 def _vocabulary() -> dict[str, type]:
     """The classes that a file may name: the dataclasses of scenes and geometry recipes, and what was registered."""
     members = {**vars(warp_mca.geometry), **vars(warp_mca.scene), **MATERIALS, **CONTACT_LAWS, **JOINTS, **LOADS}
-    members |= {**FRICTION_LAWS, **PHASES}
+    members |= {**FAILURES, **FRICTION_LAWS, **PHASES}
     return {name: item for name, item in members.items() if isinstance(item, type) and dataclasses.is_dataclass(item)}
 
 

@@ -13,6 +13,7 @@ from warp_mca.scene.absorbing import Absorbing
 from warp_mca.scene.bodies import Body, Vec3
 from warp_mca.scene.contacts import Contact, ContactAll, RigidPlane, Surface
 from warp_mca.scene.drives import Fixed, Prescribed
+from warp_mca.scene.failure import check_contacts
 from warp_mca.scene.joints import JOINTS, Joint, Prismatic, Weld
 from warp_mca.scene.loads import LOADS, Load
 from warp_mca.scene.masses import PointMass
@@ -135,6 +136,7 @@ class Scene:
         validate.vectors("Scene", gravity=self.gravity)
         if self.up is not None:
             validate.directions("Scene", up=self.up)
+        check_contacts(self.failing, self.contacts)
         for field_name, body in self._named_bodies():
             if body not in names:
                 raise bad_value(field_name, body, f"the scene's bodies are {', '.join(names)}")
@@ -178,6 +180,7 @@ class Scene:
             (self.absorbing, "a cut body with absorbing sides does not move between impacts as the large one"),
             ([a for a in self.loads if not a.inner], "loads act in an impact alone, not in the swings between"),
             (any(item.bond for item in self.listed), "bonds act in an impact alone, not in the swings between"),
+            (self.failing, "elements that failed cannot become rigid again"),
             (self.prescribed, "nodes with a Prescribed velocity cannot follow it between impacts"),
         ):
             if present:
@@ -194,6 +197,8 @@ class Scene:
             if type(phase) not in PHASES.values():
                 remedy = f"give {' or '.join(PHASES)}; register other classes by warp_mca.register"
                 raise bad_value(f"Scene.phases[{k}]", validate.brief(phase), remedy)
+        if self.phases and self.failing:
+            raise bad_value("Scene.phases", "given", f"elements of {self.failing[0]} may fail in an impact alone")
         timed = {"rigid": self.rigid, "prescribed": self.prescribed}
         timed |= {"loads": [load for load in self.loads if not load.is_constant]}
         for name, given in timed.items() if self.phases else ():
@@ -275,6 +280,11 @@ class Scene:
         skins = {body.name: Surface(body=body.name, nodes="boundary") for body in self.bodies}
         found: list[tuple[Surface, Surface | RigidPlane]] = [(item.slave, item.master) for item in self.listed]
         return found + [(skins[one], skins[other]) for one, other in self.general_pairs() if one != other]
+
+    @property
+    def failing(self) -> list[str]:
+        """Deformable bodies whose elements may fail."""
+        return [body.name for body in self.bodies if body.fails and not body.rigid]
 
     @property
     def rigid_names(self) -> list[str]:

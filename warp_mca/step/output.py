@@ -62,11 +62,15 @@ class NodalStress:
         """Stress at the corners of elements with displacements u [m]."""
         for stage, element, first in self.parts:
             stage.stresses(self.solver.work, state, u, element, first, self.points)
+            if failing := state.elements[stage.index].failing:
+                inputs = [failing.age, element, stage.corners, first]
+                wp.launch(output.leave_out_failed, len(element), inputs=inputs, outputs=[self.points])
 
     def gather(self) -> None:
         """Their means at nodes."""
         outputs = [self.tensor, self.von_mises, self.plastic]
-        wp.launch(output.nodal_stress, len(self.tensor), inputs=[self.offset, self.slot, self.points], outputs=outputs)
+        kernel = output.stress_of_whole if self.solver.model.fails else output.nodal_stress
+        wp.launch(kernel, len(self.tensor), inputs=[self.offset, self.slot, self.points], outputs=outputs)
 
 
 class Output:
@@ -88,12 +92,18 @@ class Output:
                 self._make_skin(np.concatenate([skin.nodes for skin in skins.values()]))
             if CONTACT in needs:
                 count = sum(len(stage.slave) for stage in solver.contacts)
+                if solver.model.fails:  # whatever comes to the surface
+                    count = solver.model.node_count * 2 * len(solver.contacts)
                 self.arrays[CONTACT] = {
                     "points": wp.zeros(count, dtype=wp.vec3f),
                     "state": wp.zeros(count, dtype=wp.int32),
                 }
             if VOLUME in needs:
                 self._make_volume()
+            if solver.model.fails:
+                self.failed = wp.zeros(solver.model.element_count, dtype=wp.int32)
+                for need in needs & {SURFACE, VOLUME}:
+                    self.arrays[need]["failed"] = self.failed
 
     def _make_probes(self, probes: Probes) -> None:
         nodes, local = np.unique(probes.corner, return_inverse=True)
@@ -126,6 +136,9 @@ class Output:
     def before_step(self, state: State, needs: frozenset[str]) -> None:
         """Launch what is read off the state at t(n), after its forces are known: probes, and a frame of `needs`."""
         work, u = self.solver.work, self.solver.work.at_record(state)
+        for stage in self.solver.elements if needs & {SURFACE, VOLUME} else ():
+            if failing := state.elements[stage.index].failing:
+                wp.launch(output.mark_failed, stage.count, [failing.age, stage.block.first], [self.failed])
         for stress in self._stresses(needs):
             stress.find_corners(state, u)
         if SURFACE in needs:
@@ -153,6 +166,8 @@ class Output:
     def contact_points(self, state: State, needs: frozenset[str]) -> None:
         """Launch what is read off springs, once contact is computed and before nodes move."""
         first = 0
+        if CONTACT in needs and self.solver.model.fails:
+            self.arrays[CONTACT]["state"].zero_()
         for stage in self.solver.contacts if CONTACT in needs else []:
             inputs = [self.solver.work.X, state.u, stage.slave, stage.mu, stage.sides, first]
             inputs.append(state.contacts[stage.index].spring)

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
+from warp_mca.kernels.elements.failure import sum_failed_kernel
 from warp_mca.kernels.records import ledger, output
+from warp_mca.model.columns import FAILURE, added_columns
 from warp_mca.physics.actor import Actor, When
 from warp_mca.step.stage import BESIDE, LAST, MAIN, SHOWN, Stage, Step
 from warp_mca.step.workspace import ROWS
@@ -30,12 +32,15 @@ class RecordStage(Actor):
         self.element_ranges = wp.array(layout.elements, dtype=wp.int32)
         self.most_nodes = int(np.diff(layout.nodes).max())  # of any scene
         self.most_elements = int(np.diff(layout.elements).sum(axis=(1, 2)).max())
+        self.failure = added_columns(solver.model).get(FAILURE)
+        self.sum_failed_kernel = sum_failed_kernel(solver.precision) if self.failure else None
         self.sum_elements_kernel = ledger.sum_elements_kernel(solver.precision, solver.model.viscous)
 
     def record_kernels(self) -> list[Any]:
         """Those of sums, and of probes, sections and stresses that recorders show."""
         shown = self.solver.output and self.solver.output.arrays
         own = [ledger.record_motion, self.sum_elements_kernel, *([output.nodal_stress] if shown else [])]
+        own += [self.sum_failed_kernel] if self.sum_failed_kernel else []
         return own + self.solver.sensors.kernels()
 
     def stages(self, when: When) -> Iterable[Stage]:
@@ -83,6 +88,12 @@ class RecordStage(Actor):
     def sum_elements(self, step: Step) -> None:
         """Energies and extremes of the elements."""
         self.sum_runs(self.sum_elements_kernel, self.most_elements, [self.work.energy, self.element_ranges])
+
+    def sum_failed(self, step: Step) -> None:
+        """Energy that went with elements that failed."""
+        assert self.failure is not None
+        inputs = [self.work.energy, self.element_ranges, self.failure.first]
+        self.sum_runs(self.sum_failed_kernel, self.most_elements, inputs)
 
     def sum_motion(self, step: Step) -> None:
         """Kinetic energy, works, and velocities of recorded points."""

@@ -46,6 +46,10 @@ class Replay:
             return MOST
         return MOST if state in self._ahead and not needs else max(1, FEW // substeps)
 
+    def forget(self, state: State) -> None:
+        """Capture anew what is launched for a state."""
+        self._graphs.pop(state, None)
+
     def graph(self, state: State, name: str, body: Callable[[], None]) -> None:
         """Replay the graph `name` of a state, captured from `body` at its first use."""
         with wp.ScopedDevice(self.device):

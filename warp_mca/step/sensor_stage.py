@@ -8,7 +8,7 @@ copies of their histories: the slots of the step itself may hold sums over eleme
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +22,7 @@ from warp_mca.kernels.records import sensors as kernels
 from warp_mca.model.assembly import Block
 from warp_mca.model.sensors import CHANNELS, Cut, Sensors, Spot
 from warp_mca.physics.elements import ELEMENTS
+from warp_mca.physics.elements.failing import silence
 from warp_mca.physics.elements.state import ElementState
 from warp_mca.step.workspace import ROWS
 
@@ -183,7 +184,8 @@ class _Sections:
                 continue
             block, own = solver.model.blocks[k], mine[chosen]
             element, counted = _with_neighbours(block, own)
-            stage = ELEMENTS[block.element].stage(block.part(element), solver.model.X, solver.precision)
+            part = replace(block.part(element), failing=None)
+            stage = ELEMENTS[block.element].stage(part, solver.model.X, solver.precision)
             stage.slot = self._slots
             self.layers.append(_Layer(k, _ints(element), stage, stage.new_state()))
             on_cut = np.isin(stage.slot_node, shared)
@@ -209,6 +211,8 @@ class _Sections:
                 wp.launch(self.copy_kernel, own.extreme.shape, inputs=inputs, outputs=[own.yielded, own.extreme])
             view: Any = _View(work.X, work.law, self.force, work.displacements(state), [own])
             layer.stage.launch(view, view)
+            if source.failing:
+                silence(layer.stage, layer.element, source.failing, self.force)
         inputs = [work.row, self.offset, self.slot, self.node, self.weight, work.X, state.u, self.force]
         inputs += [work.frames(state), self.channel]
         wp.launch(self.sum_kernel, (self.count, self.lanes), inputs=inputs, outputs=[self.ring])

@@ -112,6 +112,12 @@ class Solver(Made):
                 scenes=[SceneRecords() for _ in range(self.layout.count)],
             )
 
+    def renew(self, state: State) -> None:
+        """Go on with contact stages that are others than before, on the way of a state."""
+        self.groups = step_groups(self.actors, When())
+        self.replay.forget(state)
+        self.compile()
+
     def forces(self, state: State) -> None:
         """Forces of elements and contacts at the state's displacements, in `work`."""
         with wp.ScopedDevice(self.device):

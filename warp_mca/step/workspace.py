@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
+from warp_mca.kernels.elements.failure import ENERGIES
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.nodes.floating import Frames
 from warp_mca.kernels.records.columns import JACOBIAN
@@ -42,7 +43,7 @@ class Workspace:
         u_record: displacements at the latest record [m], shape (node_count,), vec3d, for energies and stresses that are
             taken while nodes move; empty on a CPU with one rate.
         v_before: velocities at the half step before a record [m/s], shape (node_count,), vec3d.
-        energy: of each element at a record, see `ElementStage.energies`, shape (5 or 6, element_count).
+        energy: of each element at a record, see `ElementStage.energies`, shape (5 to 7, element_count).
         row: of the latest record in the rings, shape (1,), int32.
         partial: ring of partial sums, shape (ROWS, scene_count, column_count, SUM_WIDTH), float64.
         point_node: recorded nodes, 0 where there is none, shape (point_count,), int32.
@@ -70,7 +71,9 @@ class Workspace:
         kept = wp.get_device().is_cuda or model.rates is not None
         self.u_record = wp.zeros(model.node_count if kept else 0, dtype=wp.vec3d)
         self.v_before = wp.zeros(model.node_count, dtype=wp.vec3d)
-        self.energy = wp.zeros((6 if model.viscous else 5, model.element_count), dtype=t.real)
+        self.energy = wp.zeros(
+            (ENERGIES if model.fails else 6 if model.viscous else 5, model.element_count), dtype=t.real
+        )
         self.row = wp.full(1, ROWS - 1, dtype=wp.int32)
         self.partial = wp.zeros((ROWS, layout.count, column_count(model), SUM_WIDTH), dtype=wp.float64)
         self.partial[:, :, JACOBIAN].fill_(1.0)  # runs beyond the last are never written

@@ -25,6 +25,7 @@ FILES = (
     "metals",
     "rubber",
     "damping",
+    "failure",
     "waves",
     "absorbing",
     "tied",

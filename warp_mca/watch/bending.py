@@ -59,6 +59,8 @@ def samples_of(model: Model) -> list[Cells]:
     for block in model.blocks:
         if not any(block.element == element for element, _ in _ENERGIES):
             continue
+        if block.failing:  # cells that fail are bent out of shape before
+            continue
         wedge = _wedges(block)
         kind = _body_of(model, block) * len(model.law) + block.material
         for k in np.flatnonzero(np.bincount(kind)):

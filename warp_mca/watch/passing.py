@@ -9,12 +9,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
+from warp_mca.base.arrays import Index
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.model import Model
+from warp_mca.physics.contact.surfaces import ContactPass
 from warp_mca.scene import Scene
 from warp_mca.watch.passing_cases import SLACK, BelowPlane, Case, Look, WithinBody, WithinItself, cases_of
 from warp_mca.watch.row import Array, Finished, Values, When, row
@@ -42,7 +45,37 @@ class Watch:
         self._dt, self._most = dt, max(1, int(span / FEWEST / dt))
         self._driven = float(np.abs(model.table_value).max(initial=0.0))
         self._gravity = float(np.linalg.norm(scene.gravity))
-        self._skins = [Skin(b.name, meshes[b.name], model.X, model.node_start[b.name]) for b in scene.bodies]
+        self._of = scene, meshes, model
+        self._take({}, model.passes)
+
+    def renew(self, faces: Mapping[str, Index], passes: tuple[ContactPass, ...], passed: Array) -> Array:
+        """Look at other surfaces from now on.
+
+        Args:
+            faces: of skins, by body in the numbering of its mesh; others are whole.
+            passes: of contact, as surfaces are now.
+            passed: what was seen before, as `SceneRecords.passed`.
+
+        Returns:
+            The same of the cases that there are now.
+        """
+        before = [case.key for case in self.cases]
+        self._take(faces, passes)
+        if not len(passed):
+            return passed
+        found = np.zeros((len(self.cases), passed.shape[1]))
+        for kept, case in zip(found, self.cases, strict=True):
+            if case.key in before:
+                kept[:] = passed[before.index(case.key)]
+        return found
+
+    def _take(self, faces: Mapping[str, Index], passes: tuple[ContactPass, ...]) -> None:
+        scene, meshes, model = self._of
+        model = replace(model, passes=passes)
+        self._skins = [
+            Skin(b.name, faces.get(b.name, meshes[b.name].boundary[0]), model.X, model.node_start[b.name])
+            for b in scene.bodies
+        ]
         self.cases = list(cases_of(scene, meshes, model, self._skins))
         self.nodes = np.concatenate([skin.nodes for skin in self._skins])[: None if self.cases else 0]
 

@@ -89,6 +89,11 @@ class Case:
         return SLACK * min(min(skin.width, skin.thickness) for skin in self.skins)
 
     @property
+    def key(self) -> tuple[str, ...]:
+        """What tells it from others of a scene."""
+        return type(self).__name__, *(skin.name for skin in self.skins), *map(str, self.passes)
+
+    @property
     def remedy(self) -> str:
         """What helps."""
         return self.remedies[bool(self.passes)]

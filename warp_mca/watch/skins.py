@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from warp_mca.base.arrays import Array, Index
 from warp_mca.base.rotation import best_rotation
 from warp_mca.geometry.cell_types import triangulated
-from warp_mca.geometry.mesh import Mesh
 from warp_mca.kernels.contact import crossing
 from warp_mca.kernels.contact.inside import depths_inside
 
@@ -42,9 +41,8 @@ class Skin:
         x: where the nodes are [m], shape (node_count, 3), float64.
     """
 
-    def __init__(self, name: str, mesh: Mesh, X: Array, start: int) -> None:
-        """Take the skin of a mesh whose nodes begin at `start` in positions X [m], shape (node_count, 3), float64."""
-        faces = mesh.boundary[0]
+    def __init__(self, name: str, faces: Index, X: Array, start: int) -> None:
+        """Take the faces of a mesh whose nodes begin at `start` in positions X [m], shape (node_count, 3), float64."""
         self.name, own = name, np.unique(faces)
         self.nodes = (own + start).astype(np.int32)
         self.triangle = np.searchsorted(own, triangulated(faces)).astype(np.int32)

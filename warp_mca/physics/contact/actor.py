@@ -12,7 +12,7 @@ from warp_mca.kernels.contact import contact
 from warp_mca.kernels.contact.spring_sums import sum_springs
 from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.contact.contact_state import ContactState
-from warp_mca.physics.contact.edge_stage import EdgeStage
+from warp_mca.physics.contact.edge_stage import EdgeStage, NoEdgeStage
 from warp_mca.physics.contact.extremes import NormalForce
 from warp_mca.physics.contact.skin_edges import EdgePass
 from warp_mca.physics.contact.stage import ContactStage
@@ -28,7 +28,12 @@ if TYPE_CHECKING:
 def stage_of(items: Sequence[ContactPass], model: Model, index: int, normal_force: NormalForce) -> ContactStage:
     """The stage of a pass of each scene, on the current device."""
     edges = [item for item in items if isinstance(item, EdgePass)]
-    return EdgeStage(edges, model, index, normal_force) if edges else ContactStage(items, model, index, normal_force)
+    if not edges:
+        return ContactStage(items, model, index, normal_force)
+    some = all(
+        any(len(ends) for ends in side) for side in zip(*((e.slave_edge, e.master_edge) for e in edges), strict=True)
+    )
+    return (EdgeStage if some else NoEdgeStage)(edges, model, index, normal_force)
 
 
 class Contacts(list[ContactStage], Actor):

@@ -158,6 +158,30 @@ class EdgeStage(ContactStage):
         split(max(springs, len(self.node)), share, CONTACT)
 
 
+class NoEdgeStage(EdgeStage):
+    """A pass of edges that has none, of bodies whose elements may fail: some may come."""
+
+    def __init__(self, items: Sequence[EdgePass], model: Model, index: int, normal_force: NormalForce) -> None:
+        """As `ContactStage`."""
+        self._begin(items, model, index, normal_force)
+        self.count, self.bvh = 0, None
+
+    def kernels(self) -> list[Any]:
+        """None."""
+        return []
+
+    search_kernels = kernels
+
+    def find_boxes(self, work: Workspace, u: wp.array) -> None:
+        """There is nothing to search."""
+
+    def list_faces(self, work: Workspace, state: State, u: wp.array) -> None:
+        """There is nothing to list."""
+
+    def launch(self, work: Workspace, state: State, dt: float, split: Split = whole) -> None:
+        """Nothing presses."""
+
+
 def _rows(node: Index, entry: Index) -> tuple[Index, Index, Index]:
     """Compressed rows of the entries of each node: the nodes, sorted, the offsets of their rows, and the entries."""
     order = np.argsort(node, kind="stable")

@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
 
 def has_sides(model: Model) -> bool:
-    """Whether a master of the model has several sides, which need the latest forces on nodes."""
-    return any(item.side.any() for item in model.passes)
+    """Whether a master of the model has several sides, which need the latest forces on nodes, or may get some."""
+    return any(item.side.any() or (model.fails and item.plane is None) for item in model.passes)
 
 
 class ContactStage:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +27,8 @@ class Elements(list[ElementStage], Actor):
         super().__init__(ELEMENTS[block.element].stage(block, model.X, solver.precision) for block in model.blocks)
         self.solver = solver
         for index, stage in enumerate(self):
+            if stage.failing:
+                stage.failing.place(model.X)
             stage.index, stage.dt = index, solver.dt / (model.rates.substeps if model.rates else 1)
 
     def new_state(self) -> list[ElementState]:
@@ -49,8 +51,18 @@ class Elements(list[ElementStage], Actor):
         def energies(own: ElementStage, step: Step) -> None:
             own.energies(work, step.state, step.split, work.at_record(step.state))
 
+        def acting(act: Callable[..., None], step: Step) -> None:
+            act(work, step.state, step.split)
+
         for own in self:
+            failing = own.failing
+            if failing:
+                yield Stage("forces", "nodes of whole elements", partial(acting, failing.follow))
             if level is None or own.parts(level, chain):
                 yield Stage("forces", "element forces", partial(forces, own))
+            if failing:
+                yield Stage("forces", "failure of elements", partial(acting, failing.judge))
             yield Stage("energies", "element energies", partial(energies, own), SUMS, only_records=True)
         yield Stage("sums", "element sums", self.solver.records.sum_elements, SUMS, only_records=True)
+        if self.solver.model.fails:
+            yield Stage("sums", "sums of failed elements", self.solver.records.sum_failed, SUMS, only_records=True)

@@ -152,7 +152,7 @@ class PatchStage(ElementStage):
 def hexahedral_stage(
     block: Block, X: Array, precision: str, kernels: Any, patch_kernels: Any, points: int
 ) -> ElementStage:
-    """By patches on a GPU at small strain; else, or with a rated or general law, one by one; arguments as there."""
-    if block.finite or law_functions(block.law, precision).by_points or not wp.get_device().is_cuda:
+    """By patches on a GPU at small strain; one by one else, with a rated or general law, or if elements may fail."""
+    if block.failing or block.finite or law_functions(block.law, precision).by_points or not wp.get_device().is_cuda:
         return ElementStage(block, precision, kernels, points)
     return PatchStage(block, X, precision, kernels, patch_kernels, points)

@@ -18,6 +18,7 @@ from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.simd import vectorised
 from warp_mca.kernels.loads import thermal
 from warp_mca.kernels.materials.laws import ROWS, law_functions, row_count
+from warp_mca.physics.elements.failing import failing_of
 from warp_mca.physics.elements.state import ElementState
 from warp_mca.step.threads import ELEMENTS, Split, whole
 
@@ -61,6 +62,7 @@ class ElementStage:
         slot_node: node that each slot of the force array belongs to, shape (slot_count,), int32: corner by corner.
         slot: where the block's slots start in the force array.
         slot_level: level of `Model.rates` of each slot, shape (slot_count,), int32; empty with one rate.
+        failing: what elements that may fail have more, or None.
         rounds: patches that a block of threads computes in turn.
     """
 
@@ -88,6 +90,7 @@ class ElementStage:
         self.kept: tuple[str, ...] = points * self.law.history + more
         self.lags = hasattr(kernels, "lags") and kernels.lags(self.law, block.finite)
         self.real = scalars(precision).real
+        self.failing = failing_of(self, precision, kernels)
         self.no_nodes = [wp.zeros((0, 0), dtype=wp.int32), wp.zeros(0, dtype=self.real)]
         kind, viscous = (precision, block.law, block.finite), [block.joining] if block.joining else []
         self.force_kernel = vectorised(kernels.force_kernel(*kind, *viscous), large=block.finite or points > 1)
@@ -96,7 +99,7 @@ class ElementStage:
 
     def kernels(self) -> list[Any]:
         """Those of a step."""
-        return [self.force_kernel, self.energy_kernel]
+        return [self.force_kernel, self.energy_kernel, *(self.failing.kernels() if self.failing else [])]
 
     def nodal(self, part: slice) -> list[Any]:
         """Pressure nodes of the corners of a range of elements, and dilatation of all pressure nodes; empty without."""
@@ -116,6 +119,7 @@ class ElementStage:
             yielded=wp.zeros(self.count if self.block.plastic else 0, dtype=wp.int32),
             history=wp.zeros((row_count(self.kept), self.count if self.kept else 0), dtype=self.real),
             extreme=wp.array(extreme, dtype=self.real),
+            failing=self.failing.new_state() if self.failing else None,
         )
 
     def rotated(self, history: NDArray, rotation: NDArray[np.float64]) -> NDArray:
@@ -139,6 +143,13 @@ class ElementStage:
         """Yield flags and history of a range of elements."""
         yielded = own.yielded[part] if self.block.plastic else own.yielded
         return [yielded, own.history[:, part] if self.kept else own.history]
+
+    def _nodes(self, work: Workspace, state: State, u: wp.array | None = None) -> tuple[wp.array, wp.array, wp.array]:
+        """Positions, nodes of each element and displacements that elements compute with, those of the state if u is
+        None; elements that may fail have their own."""
+        if self.failing:
+            return self.failing.X, self.failing.conn, state.elements[self.index].failing.u
+        return work.X, self.conn, work.displacements(state) if u is None else u
 
     def make_room(self, blocks: int) -> None:
         """Called where contact is computed beside the elements: leave room on the device for its blocks of threads."""
@@ -173,7 +184,8 @@ class ElementStage:
         own = state.elements[self.index]
 
         def launch(part: slice) -> None:
-            inputs = [work.X, self.conn[:, part], self.material[part], work.law, work.displacements(state)]
+            X, conn, u = self._nodes(work, state)
+            inputs = [X, conn[:, part], self.material[part], work.law, u]
             dt = self.dt * (1 << bisect_right(self.block.level_ends, part.start))
             inputs += [self.slot + part.start, self.count, *self.more(part), dt]
             outputs = [*self._history(own, part), own.extreme[:, part], work.force]
@@ -200,15 +212,17 @@ class ElementStage:
         To be called after `launch` of the same step; u are the displacements of that [m], if not those of the state.
         """
         own = state.elements[self.index]
-        seen = work.displacements(state) if u is None or work.frame is not None else u
+        X, conn, seen = self._nodes(work, state, None if work.frame is not None else u)
 
         def launch(part: slice) -> None:
-            inputs = [work.X, self.conn[:, part], self.material[part], work.law, *self._history(own, part)]
+            inputs = [X, conn[:, part], self.material[part], work.law, *self._history(own, part)]
             inputs += [own.extreme[:, part], seen, self.block.first + part.start, *self.nodal(part)]
             count, first = part.stop - part.start, self.block.first + part.start
             wp.launch(self.energy_kernel, count, inputs=inputs, outputs=[work.energy], block_dim=BLOCK_DIM)
             if self.block.viscous:
                 wp.copy(work.energy[5, first : first + count], own.extreme[TAKEN, part])
+            if self.failing:
+                self.failing.lose(work, state, part)
 
         split(self.count, launch, ELEMENTS)
 
@@ -217,7 +231,8 @@ class ElementStage:
     ) -> None:
         """Stress [Pa] and plastic strain [-] at the corners of some elements with displacements u, from `first` on."""
         own = state.elements[self.index]
-        inputs = [work.X, self.conn, self.material, work.law, own.yielded, own.history, u, element, first]
+        X, conn, seen = self._nodes(work, state, u)
+        inputs = [X, conn, self.material, work.law, own.yielded, own.history, seen, element, first]
         inputs += self.nodal(slice(0, self.count))
         wp.launch(self.stress_kernel, len(element), inputs=inputs, outputs=[stress], block_dim=BLOCK_DIM)
         if self.block.heated:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import warp as wp
 
+from warp_mca.physics.elements.failing import FailureState
+
 
 @dataclass(eq=False)
 class ElementState:
@@ -19,8 +21,10 @@ class ElementState:
         extreme: greatest square of the deviatoric strain and greatest loss of volume 1 - J of any step [-], from 0 on;
             where internal vectors lag behind, the energy that this took [J]; of viscous elements, what
             `kernels.elements.viscosity` lists; shape (row_count, element_count), float32 or float64.
+        failing: of elements that may fail, `FailureState`; None of others.
     """
 
     yielded: wp.array
     history: wp.array
     extreme: wp.array
+    failing: FailureState | None = None

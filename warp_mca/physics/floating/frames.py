@@ -41,9 +41,9 @@ class FloatingFrames:
 def with_floating_frames(model: Model, scenes: Sequence[Scene], span: float, precision: str) -> Model:
     """The model with floating frames, if a body may turn and would be heated in a phase of `span` seconds.
 
-    Elements with steps of their own have none.
+    Elements with steps of their own, or that may fail, have none.
     """
-    if precision != "mixed" or model.rates:
+    if precision != "mixed" or model.rates or model.fails:
         return model
     bodies = [body for scene in scenes for body in scene.bodies]  # as their nodes follow each other
     start = np.array(list(model.node_start.values()), dtype=np.int64)

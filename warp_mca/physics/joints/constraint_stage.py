@@ -68,6 +68,8 @@ class ConstraintStage(Actor):
         for item in model.passes:
             role[item.slave] |= TOUCHABLE
             role[item.master] |= TOUCHABLE
+            if model.fails:  # any node may come to the surface
+                role |= TOUCHABLE
         for item in (item for items in model.loads.values() for item in items):
             role[item.node] |= TOUCHABLE
         if not self.bound and not role.any():

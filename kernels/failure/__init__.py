@@ -1,0 +1,1 @@
+"""Owns the kernels of failure: criteria, and how elements that meet them are removed."""
