@@ -17,7 +17,7 @@ from warp_mca.kernels.failure.criteria import criterion, parameter_type, point_t
 from warp_mca.kernels.hardware.block import block_sum
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.materials.flow import history_functions
-from warp_mca.kernels.materials.kinematics import kinematics
+from warp_mca.kernels.materials.isochoric import law_kinematics
 from warp_mca.kernels.materials.laws import law_functions
 from warp_mca.kernels.records.ledger import run_of
 
@@ -68,7 +68,7 @@ def point_function(maker: Maker, precision: str, law_name: str, finite: bool) ->
     """
     form, point, place = parts_of(maker, precision, law_name, finite)
     struct, gradient, own, general, read = form.struct, form.gradient, form.pressure == OWN, point.general, point.read
-    k, R, Point = kinematics(precision, finite), scalars(precision).real, point_type(precision)
+    k, R, Point = law_kinematics(precision, law_name, finite), scalars(precision).real, point_type(precision)
     dilatation_of, deviator, pressure_of, cauchy, volume_strain = (
         k.dilatation,
         k.deviator,
@@ -163,7 +163,7 @@ def failure_kernel(maker: Maker, failure: str, precision: str, law_name: str, fi
             if wp.static(plastic):
                 flag = yielded[e]
             shape = load(X, u, conn, e, m, flag, law, history)
-            theta, pressure, _energy = shared(shape, e, law[m, 0], group, dilatation)
+            theta, pressure, _energy = shared(shape, e, law[m, 0], R(0.0), group, dilatation)
             c = row()
             for i in range(wp.static(width)):
                 c[i] = parameter[1 + i, e]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -85,7 +85,7 @@ def thermal_strains(parts: Assembly) -> Array | None:
 def thermal_energy(model: Model) -> float:
     """Energy that it takes to press all thermal strains of a model back at their greatest [J]; 0 without any."""
     total = 0.0
-    loads: Sequence[Any] = model.loads.get(ThermalStrain.__name__, ())
+    loads: Any = model.loads.get(ThermalStrain.__name__, ())
     greatest = np.array([abs(load.strain) * np.abs(load.values).max() for load in loads])
     for block in model.blocks:
         if block.thermal is not None:

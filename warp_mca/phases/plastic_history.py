@@ -26,7 +26,7 @@ class BlockHistory:
         history: as in `ElementState`, shape (row_count, element_count), float32 or float64.
     """
 
-    kind: tuple[bool, str, str, bool, bool]
+    kind: tuple[bool, str, str, bool, int, str]
     element: NDArray[np.int32]
     yielded: NDArray[np.int32]
     history: NDArray

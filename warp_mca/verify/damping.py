@@ -81,10 +81,13 @@ def rayleigh_bar(setup: Setup) -> list[Row]:
     first = c / (4.0 * length)
     w = 2.0 * np.pi * first
     rows = []
-    for name, own in (("mass", {"mass": 0.04 * w}), ("stiffness", {"stiffness": 0.04 / w})):
+    for name, own in (
+        ("mass", mca.Damping(body="bar", mass=0.04 * w)),
+        ("stiffness", mca.Damping(body="bar", stiffness=0.04 / w)),
+    ):
         bar = {"length": length, "depth": 0.02, "width": 0.01, "axial": count, "deep": 2, "sag": 0.0, "samples": 400}
         scene = setup.scene("cantilever", push=1e-4 * c**2 / length, duration=5.0 / first, **bar)
-        result = setup.run(dataclasses.replace(scene, loads=(mca.Damping(body="bar", **own),)))
+        result = setup.run(dataclasses.replace(scene, loads=(own,)))
         modes = tuple((2 * k + 1) * first for k in range(4))
         _, found = decaying_modes(result.time, result["tip_vx"], modes, 0.02)
         why = "lumped masses lower the frequency by some 0.1 %; stiffness reads the rate of half a step before"

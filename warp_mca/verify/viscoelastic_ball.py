@@ -49,7 +49,7 @@ def contact_force(duration: float, steps: int) -> tuple[Array, Array]:
         v -= dt * force[n] / mass
         if not grows and end == 0:
             break
-    return time, force
+    return np.asarray(time, dtype=np.float64), force
 
 
 @case(

@@ -58,7 +58,7 @@ class PushState:
     clock: wp.array
 
 
-def tables_of(items: Sequence[Any]) -> Tables:
+def tables_of(items: Sequence[Any]) -> Any:
     """The factors of loads over time, on the current device; their `times` and `values`."""
     found = Tables()
     found.first = wp.array(offsets([len(item.times) for item in items]), dtype=wp.int32)

@@ -122,7 +122,7 @@ def _point(
     else:
         node, weight = weighted_set(mesh.nodes(nodes), assembly.mass[assembly.all_nodes(body)])
     own, place = np.unique(node, return_inverse=True)  # corners of wedges coincide
-    return own + first, np.bincount(place, weight)
+    return own + first, np.bincount(place, weight).astype(np.float64)
 
 
 def _lightness(assembly: Assembly, body: str, node: Index, weight: Array, n: Array) -> float:

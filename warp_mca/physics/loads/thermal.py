@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
 from warp_mca.base.joining import AS_IS, joinable, offsets
 from warp_mca.kernels.loads.thermal import Heated, Kept, heat_kernel, work_kernel
+from warp_mca.kernels.materials.laws import law_functions
 from warp_mca.model.assembly import Assembly, Block
 from warp_mca.physics.actor import When
 from warp_mca.physics.loads.nodal_stage import NodalLoad
@@ -72,9 +72,12 @@ def build(load: ThermalStrain, assembly: Assembly) -> HeatedBody:
     first = assembly.element_start[load.body]
     own = assembly.material[first : first + assembly.meshes[load.body].cell_count]
     for material in (assembly.materials[m] for m in np.unique(own)):
-        if material.law and hasattr(import_module(material.law), "stress"):
-            remedy = f"the law of {type(material).__name__} gives the whole stress; take an elastic material or a metal"
+        functions = law_functions(material.law, "mixed")
+        if material.law and not (functions.return_map or functions.rated):
+            remedy = f"its material {type(material).__name__} takes no thermal strain; take Elastic or a metal"
             raise bad_value("ThermalStrain.body", load.body, remedy)
+        if material.failure is not None:
+            raise bad_value("ThermalStrain.body", load.body, "its elements may fail; leave failure or the strain out")
     times, values = (np.array(column) for column in (load.table.times, load.table.values))
     return HeatedBody(node=np.zeros(0, np.int32), times=times, values=values, strain=load.expansion * load.temperature)
 
@@ -93,7 +96,7 @@ class Stage(NodalLoad):
     def __init__(self, solver: Solver, name: str) -> None:
         """Allocate on the current device."""
         model = solver.model
-        items: Sequence[Any] = model.loads[name]
+        items: Any = model.loads[name]
         parts = [own for block in model.blocks if (own := _heated(block)) is not None]
         scene = np.array([item.scene for item in items])[np.concatenate([load for _, load, _ in parts])]
         self._counts = np.bincount(scene, minlength=solver.layout.count).astype(np.int32)
