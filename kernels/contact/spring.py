@@ -155,6 +155,12 @@ def spring_function(friction: bool, laws: Laws) -> Any:
         return share, lost
 
     @wp.func
+    def friction_before(s: int, spring: Spring):
+        if wp.static(friction):
+            return spring.tangential[s], spring.friction[s], spring.stick_impulse[s]
+        return wp.vec3d(), wp.float64(0.0), wp.float64(0.0)
+
+    @wp.func
     def press(
         s: int,
         gap: wp.float64,
@@ -174,13 +180,7 @@ def spring_function(friction: bool, laws: Laws) -> Any:
         made_before = spring.made[s]
         force_old = spring.force[s]
         energy_old = spring.energy[s]
-        tangential = wp.vec3d()
-        friction_work = wp.float64(0.0)
-        stick_impulse = wp.float64(0.0)
-        if wp.static(friction):
-            tangential = spring.tangential[s]
-            friction_work = spring.friction[s]
-            stick_impulse = spring.stick_impulse[s]
+        tangential, friction_work, stick_impulse = friction_before(s, spring)
         half = wp.float64(0.5)
         Fn = law_force(-gap, k, spring.parameters, s)
         stored = law_energy(-gap, k, spring.parameters, s)

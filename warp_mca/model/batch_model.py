@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from warp_mca.base.arrays import Index
 from warp_mca.base.errors import bad_value
 from warp_mca.base.joining import join, offsets
-from warp_mca.model.assembly import Block
+from warp_mca.model.block import Block
 from warp_mca.model.failing import joined
 from warp_mca.model.layout import Layout
 from warp_mca.model.mass_scaling import MassScaling

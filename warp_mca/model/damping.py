@@ -47,7 +47,7 @@ def with_damping(stable: StableStep, parts: Assembly, loads: Loads, added: Array
         stiff = replace(own, dt=own.dt / float(np.sqrt(1.0 + item.gain.sum())))
         found.append(with_dashpots(stiff, decay + item.stiffness * square))
     least = min(found, key=lambda step: step.dt)
-    return replace(least, damped=stable.dt / least.dt)
+    return replace(least, damped=stable.dt / least.dt if least.dt > 0.0 else 1.0)
 
 
 def _all(loads: Loads) -> Iterable[LoadedNodes]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from warp_mca.base.arrays import Array, Index
 from warp_mca.base.joining import ALONE, AS_IS, GIVEN, ITEMS, PART, joinable, of, offsets_of
-from warp_mca.model.assembly import Block
+from warp_mca.model.block import Block
 from warp_mca.model.layout import Layout
 from warp_mca.model.mass_scaling import MassScaling
 from warp_mca.model.rates import Rates

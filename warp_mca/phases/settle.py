@@ -182,7 +182,10 @@ class HalfSteps:
         changed = masks[0] & ~self.waiting[0]
         lost = self._kinetic(before[0], after[0], changed)
         self.kept.damping += lost - self._kinetic(given[0], given[0] + 2.0 * half[0], changed)
-        self.kept.damping += self._unfelt(self.impact.steps.dt * (before[0] - given[0]))
+        way = self.impact.steps.dt * (before[0] - given[0])
+        self.kept.damping += self._unfelt(way)
+        for kind in self.solver.model.loads:
+            getattr(self.solver, kind).feel(self.state, way)
 
     def _unfelt(self, way: Array) -> float:
         """Work of friction over the way that a change of velocity hides from springs along surfaces [J].

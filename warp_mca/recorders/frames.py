@@ -27,7 +27,7 @@ from warp_mca.step.transfer import SLOTS, Transfer
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
-    from warp_mca.model.assembly import Block
+    from warp_mca.model.block import Block
     from warp_mca.model.model import Model
     from warp_mca.step.output import Output
 

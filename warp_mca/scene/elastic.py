@@ -28,6 +28,7 @@ class Elastic:
         failure: criterion by which elements of it fail and are removed; None: they never do.
         law: module of its law, with the functions of `kernels.materials.laws`; empty where it never flows.
         finite_only: whether it makes no sense at small strain.
+        flows: whether its law, if any, has plastic strain.
     """
 
     E: float
@@ -36,13 +37,14 @@ class Elastic:
     failure: Failure | None = None
     law: ClassVar[str] = ""
     finite_only: ClassVar[bool] = False
+    flows: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         validate.plain(self)
         validate.positive(type(self).__name__, E=self.E, rho=self.rho)
         if not (validate.is_number(self.nu) and -1.0 < self.nu < 0.5):
             raise bad_value(f"{type(self).__name__}.nu", self.nu, "Poisson's ratio must lie in (-1, 0.5)")
-        check_failure(type(self).__name__, self.failure, bool(self.law))
+        check_failure(type(self).__name__, self.failure, bool(self.law) and self.flows)
 
     @property
     def bulk_modulus(self) -> float:

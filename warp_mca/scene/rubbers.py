@@ -25,6 +25,7 @@ class Hyperelastic(Elastic):
     nu: float = 0.495
     least_stretch: float = 0.7
     finite_only = True
+    flows = False
 
     def __post_init__(self) -> None:
         kind = type(self).__name__

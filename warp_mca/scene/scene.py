@@ -107,8 +107,7 @@ class Scene:
         self._check_t_end()
         self._check_phases()
         if self.masses and self.rigid:
-            remedy = "links of a RigidPhase have the mass of their meshes alone; leave one of them out"
-            raise bad_value("Scene.masses", "PointMass", remedy)
+            raise bad_value("Scene.masses", "PointMass", "links of a RigidPhase take none; leave one of them out")
         validate.within("Scene", 1.0 / FINEST, FINEST, refine=self.refine)
         validate.kinds("Scene", (Point, NoneType), "give a Point or None", tip=self.tip, target=self.target)
         validate.kinds("Scene", Mapping, "give a dict of values by name", parameters=self.parameters)
@@ -121,8 +120,7 @@ class Scene:
         validate.unique("Scene.paths", [path.name for path in self.paths], "path")
         sensors = [item.name for item in (*self.probes, *self.sections)]
         validate.unique("Scene.probes", sensors, "probe and each section")
-        contacts = [contact.name for contact in self.contacts if contact.name is not None]
-        validate.unique("Scene.contacts", contacts, "contact")
+        validate.unique("Scene.contacts", contacts := [c.name for c in self.contacts if c.name is not None], "contact")
         if shared := sorted(set(sensors) & set(contacts)):
             raise bad_value("Scene.probes", shared, "contacts have these names too, and columns of tables; rename them")
         validate.unique("Scene.joints", [joint.name for joint in self.joints], "joint")

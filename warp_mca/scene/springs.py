@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+import numpy as np
+
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.scene.bodies import Vec3
@@ -61,8 +63,9 @@ class Spring(Load):
     def __post_init__(self) -> None:
         super().__post_init__()
         validate.texts("Spring", name=self.name)
-        if self.name.splitlines() != [self.name]:
-            raise bad_value("Spring.name", self.name, "columns have it; give a word, or some in one line")
+        if self.name.splitlines() != [self.name] or set(self.name) & {",", '"'}:
+            remedy = "columns have it; give a word, or some in one line without commas and quotation marks"
+            raise bad_value("Spring.name", self.name, remedy)
         validate.within(self.title, 0.0, 1e15, stiffness=self.stiffness, damping=self.damping)
         validate.within(self.title, -1e15, 1e15, preload=self.preload)
         self._check_points()
@@ -111,10 +114,10 @@ class Spring(Load):
             raise bad_value(f"{self.title}.{y}", len(ys), f"give {len(xs)} numbers, one for each of {x}")
         if any(b - a <= 1e-12 * max(abs(a), abs(b)) for a, b in pairwise(xs)):
             raise bad_value(f"{self.title}.{x}", xs, "list them in increasing order")
-        if number == "damping" and any(speed * force < 0.0 for speed, force in zip(xs, ys, strict=True)):
-            raise bad_value(
-                f"{self.title}.{y}", ys, "a dashpot resists: give tension at speeds above 0, negative below"
-            )
+        resists = all(speed * force >= 0.0 for speed, force in zip(xs, ys, strict=True))
+        if number == "damping" and not (resists and float(np.interp(0.0, xs, ys)) == 0.0):
+            remedy = "a dashpot resists: give tension at speeds above 0, negative below, and none at 0"
+            raise bad_value(f"{self.title}.{y}", ys, remedy)
 
     @property
     def title(self) -> str:

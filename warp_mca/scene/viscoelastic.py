@@ -36,18 +36,21 @@ class Prony(Elastic):
     g: tuple[float, ...]
     tau: tuple[float, ...]
     k: tuple[float, ...] = ()
+    flows = False
 
     def __post_init__(self) -> None:
         if type(self.elastic) is not Elastic and not isinstance(self.elastic, Hyperelastic):
             remedy = "give an Elastic, NeoHookean, MooneyRivlin or Ogden, whose stress the series relaxes"
             raise bad_value("Prony.elastic", self.elastic, remedy)
+        if self.elastic.failure is not None:
+            raise bad_value("Prony.elastic", self.elastic, "give its failure to the Prony series in place of this")
         for name in ("E", "nu", "rho"):
             object.__setattr__(self, name, getattr(self.elastic, name))
-        super().__post_init__()
         for name in ("g", "tau", "k"):
             value = getattr(self, name)
-            if not (isinstance(value, tuple) and all(validate.is_number(entry) for entry in value)):
+            if not (validate.is_list(value) and all(validate.is_number(entry) for entry in value)):
                 raise bad_value(f"Prony.{name}", value, "give a finite number for each term")
+        super().__post_init__()
         if not 1 <= len(self.g) <= TERMS:
             raise bad_value("Prony.g", self.g, f"give one to {TERMS} terms")
         if not (min(self.g) > 0.0 and sum(self.g) < 1.0):

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from warp_mca.base.arrays import Index
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.records import sensors as kernels
-from warp_mca.model.assembly import Block
+from warp_mca.model.block import Block
 from warp_mca.model.sensors import CHANNELS, Cut, Sensors, Spot
 from warp_mca.physics.elements import ELEMENTS
 from warp_mca.physics.elements.failing import silence

@@ -20,7 +20,7 @@ from warp_mca.watch.bent_cells import BENT, COLUMNS, FLOW, FLOWING, MISSED, RIGH
 from warp_mca.watch.row import Array, Finished, Values, When, row
 
 if TYPE_CHECKING:
-    from warp_mca.model.assembly import Block
+    from warp_mca.model.block import Block
     from warp_mca.model.model import Model
 
 # Error of deflections from which on a word is said. Of two bodies that strike, forces and times go with the root of the

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Block
+    from warp_mca.model.block import Block
     from warp_mca.physics.elements.stage import ElementStage
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from warp_mca.model.precision import limited
 from warp_mca.step.threads import ELEMENTS, Split, whole
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Block
+    from warp_mca.model.block import Block
     from warp_mca.physics.elements.stage import ElementStage
     from warp_mca.step.state import State
     from warp_mca.step.workspace import Workspace

@@ -8,7 +8,7 @@ from warp_mca.physics.elements.element import Array
 from warp_mca.physics.elements.hexahedron import eigenvalue_bounds, largest_eigenvalues, lumped_masses, mean_gradients
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Block
+    from warp_mca.model.block import Block
     from warp_mca.physics.elements.stage import ElementStage
 
 

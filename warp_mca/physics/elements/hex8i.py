@@ -17,7 +17,7 @@ from warp_mca.physics.elements.hexahedron import (
 )
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Block
+    from warp_mca.model.block import Block
     from warp_mca.physics.elements.stage import ElementStage
 
 _VOIGT = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))

@@ -17,7 +17,7 @@ from warp_mca.physics.elements.state import ElementState
 from warp_mca.step.threads import Split, whole
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Block
+    from warp_mca.model.block import Block
     from warp_mca.step.state import State
     from warp_mca.step.workspace import Workspace
 

@@ -68,6 +68,11 @@ def build(load: Damping, assembly: Assembly) -> DampedNodes:
     if (load.stiffness or len(gain)) and any(scene.impact.viscosity):
         remedy = "its rate does not go with stiffness and loss_factor of a Damping; leave one of them out"
         raise bad_value("ImpactPhase.bulk_viscosity", scene.impact.bulk_viscosity, remedy)
+    first = assembly.element_start[load.body]
+    own = np.unique(assembly.material[first : first + assembly.meshes[load.body].cell_count])
+    if (load.stiffness or len(gain)) and any(assembly.materials[m].failure is not None for m in own):
+        remedy = "its elements may fail, but their damping would go on; give mass alone, or leave failure out"
+        raise bad_value("Damping.body", load.body, remedy)
     held = _held(scene, assembly, load.body)
     anchor, turns, hidden = _allowed(held, assembly, load.body)
     if load.mass and load.about == "body":

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
+from warp_mca.base.arrays import Array
 from warp_mca.base.joining import offsets
 from warp_mca.kernels.nodes import damping
 from warp_mca.kernels.records.ledger import RUN, SUM_WIDTH
@@ -124,6 +125,12 @@ class DampingStage(NodalLoad):
             wp.launch(self.kernel, part.stop - part.start, inputs=inputs, outputs=outputs)
 
         step.split(self.count, launch, NODES)
+
+    def feel(self, state: State, way: Array) -> None:
+        """Count what the forces of the latest step took."""
+        own = state.parts[self.name]
+        moved = way[np.array(self.node.numpy(), dtype=np.int32)]
+        own.taken.assign(own.taken.numpy() - (own.damping.numpy() * moved).sum(axis=1))
 
     def energies_of(self, state: State) -> Sequence[wp.array]:
         """What damping took from each node."""

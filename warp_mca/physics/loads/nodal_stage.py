@@ -9,6 +9,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array
 from warp_mca.base.joining import offsets
 from warp_mca.kernels.records.entries import list_entries, sum_entries
 from warp_mca.model.columns import added_columns
@@ -67,6 +68,12 @@ class NodalLoad(Actor):
     def readings_of(self, state: State) -> Sequence[wp.array]:
         """Of each of `Load.readings` at t(n), an entry for each load, shape (len(items),), float64."""
         return []
+
+    def feel(self, state: State, way: Array) -> None:
+        """Count the energy over a way [m] of each node, shape (node_count, 3), that a change of velocities hid.
+
+        The next step counts what nodes moved by the new velocities, though the old ones had moved them.
+        """
 
     def record_kernels(self) -> list[Any]:
         """That of the sums, and of what is read off each load."""

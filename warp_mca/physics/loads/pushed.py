@@ -10,6 +10,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array
 from warp_mca.base.joining import AS_IS, joinable, offsets
 from warp_mca.kernels.loads.amplitude import Tables
 from warp_mca.physics.loads.nodal import LoadedNodes
@@ -113,6 +114,11 @@ class PushedNodes(NodalLoad):
         given = [self.device_node, self.device_begin, *inputs, state.v, self.solver.common_dt, start]
         outputs = [self.work.nodal_force, own.force, own.work, own.clock]
         wp.launch(kernel, self.count, inputs=given, outputs=outputs)
+
+    def feel(self, state: State, way: Array) -> None:
+        """Count the work of the forces of the latest step."""
+        own = state.parts[self.name]
+        own.work.assign(own.work.numpy() + (own.force.numpy() * way[self.node]).sum(axis=1))
 
     def energies_of(self, state: State) -> list[wp.array]:
         """Work."""

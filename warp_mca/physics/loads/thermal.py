@@ -15,7 +15,8 @@ from warp_mca.base.errors import bad_value
 from warp_mca.base.joining import AS_IS, joinable, offsets
 from warp_mca.kernels.loads.thermal import Heated, Kept, heat_kernel, work_kernel
 from warp_mca.kernels.materials.laws import law_functions
-from warp_mca.model.assembly import Assembly, Block
+from warp_mca.model.assembly import Assembly
+from warp_mca.model.block import Block
 from warp_mca.physics.actor import When
 from warp_mca.physics.loads.nodal_stage import NodalLoad
 from warp_mca.physics.loads.pushed import TimedNodes, tables_of
