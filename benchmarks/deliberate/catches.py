@@ -70,6 +70,7 @@ CATCHES: dict[str, tuple[str, ...]] = {
     "decaying_friction": ("friction_does_not_decay", "friction_decays_too_fast", "slip_work_halved"),
     "stick_slip_cycle": ("friction_does_not_decay", "friction_decays_too_fast", "slip_work_halved"),
     "capped_friction": ("caps_on_whole_faces", "slip_work_halved"),
+    "partial_slip": ("friction_limit_halved",),
     "rolling_sphere": ("friction_limit_doubled", "friction_limit_ignored"),
     "chain_mujoco": ("rate_force_reversed", "far_links_weightless"),
     "chain_energy": ("rate_force_reversed", "far_links_weightless"),

@@ -36,6 +36,7 @@ FILES = (
     "rates",
     "friction",
     "friction_laws",
+    "partial_slip",
     "rolling",
     "rigid",
     "hinges",
