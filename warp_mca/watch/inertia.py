@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from warp_mca.model.model import Model
     from warp_mca.scene import Body
 
-TURNING = 1e-2  # energy of the rotation over that of the translation, below which inertia does not matter
+TURNING = 1e-2  # energy of the rotation over twice that of the motion, below which inertia does not matter
 ROCKING = 1e-3  # the same over weight times size: bodies at rest rock on their contact springs
 HELD = 1e-6  # eigenvalue of what holds a body over the greatest, up to which a motion is free
 
@@ -75,12 +75,13 @@ def raised_inertia(c: Finished, most: float) -> Iterator[Values]:
         mesh, own = c.meshes[body.name], c.nodes(body.name)
         mass = model.mass[own]
         begin, end = (_motion(x[own], w[own], mass) for x, w in ((model.X, model.V), (model.X + c.u, c.v)))
+        first, last = (float(mass @ (w[own] ** 2).sum(axis=1)) for w in (model.V, c.v))
         weight = float(np.linalg.norm(model.gravity[0])) * begin.mass * float(np.ptp(mesh.points, axis=0).max())
-        still = max(TURNING * begin.mass * begin.velocity @ begin.velocity, ROCKING * weight)
+        still = max(TURNING * first, ROCKING * weight)
         turns = []
-        for motion, x in ((begin, model.X), (end, model.X + c.u)):
+        for motion, x, energy in ((begin, model.X, first), (end, model.X + c.u, last)):
             moved = _allowed(c, body.name, x, motion)
-            if moved.rotation_energy > max(still, TURNING * motion.mass * motion.velocity @ motion.velocity):
+            if moved.rotation_energy > max(still, TURNING * energy):
                 turns.append((moved, x))
         turns = [(motion, x) for motion, x in turns if _most(motion, mesh) > most]
         if turns and (excess := max(_excess(body, mesh, model, own, *turn) for turn in turns)) > most:
