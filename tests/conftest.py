@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import pytest
 
@@ -39,9 +40,9 @@ def no_modules_of_other_files(tmp_path_factory: pytest.TempPathFactory) -> Itera
             del sys.modules[name]
 
 
-@pytest.fixture
-def register() -> Iterator[Callable[..., object]]:
-    """`warp_mca.register`; after the test the tables of kinds are as they were before it."""
+@contextmanager
+def kinds_restored() -> Iterator[Callable[..., object]]:
+    """`warp_mca.register`; at the end the tables of kinds are as they were before."""
     from warp_mca.registration import TABLES, register
 
     tables = [table.entries for table in TABLES.values()]
@@ -50,6 +51,20 @@ def register() -> Iterator[Callable[..., object]]:
     for table, entries in zip(tables, before, strict=True):
         table.clear()
         table.update(entries)
+
+
+@pytest.fixture
+def register() -> Iterator[Callable[..., object]]:
+    """`warp_mca.register`; after the test the tables of kinds are as they were before it."""
+    with kinds_restored() as register:
+        yield register
+
+
+@pytest.fixture(autouse=True, scope="module")
+def no_kinds_of_other_files() -> Iterator[None]:
+    """What code of pages registers is forgotten behind its file."""
+    with kinds_restored():
+        yield
 
 
 @pytest.fixture

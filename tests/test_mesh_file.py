@@ -29,7 +29,7 @@ def write(file: Path, bars: FlyingBars, ok: bool = True) -> None:
     last = bars.frame(INDEX)
     assert last.volume is not None
     recorder.frame(last)
-    for field in vars(last.volume).values():
+    for field in (array for array in vars(last.volume).values() if array is not None):
         field[:] = -1.0  # the buffers of a frame are used again
     recorder.finish(ok)
     recorder.finish(False)

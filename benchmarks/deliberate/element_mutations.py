@@ -62,8 +62,8 @@ ELEMENT_MUTATIONS: dict[str, Mutation] = {
     "rate_halved": Mutation(
         "Cowper and Symonds' law takes half the rate of the plastic strain",
         "kernels/materials/cowper_symonds.py",
-        "wp.pow(dp / (dt * c.law",
-        "wp.pow(R(0.5) * dp / (dt * c.law",
+        "power(dp / (dt * c.law",
+        "power(R(0.5) * dp / (dt * c.law",
         element="tet4",
     ),
     "back_stress_never_fades": Mutation(
