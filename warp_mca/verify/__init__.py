@@ -41,6 +41,8 @@ FILES = (
     "rigid",
     "hinges",
     "rigid_bodies",
+    "body_joints",
+    "joint_loops",
     "loads",
 )
 
