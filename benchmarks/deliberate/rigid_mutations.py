@@ -33,7 +33,7 @@ RIGID_MUTATIONS: dict[str, Mutation] = {
         "the first freedom of a joint does not carry the second",
         "kernels/nodes/rigid_joints.py",
         "            tail = then(freedom_pose(e, joints, state, step_out), tail)",
-        "            tail = then(tail, freedom_pose(e, joints, state, step_out))",
+        "            tail = then(tail, tail)",
     ),
     "rotor_halved": Mutation(
         "rotors in joints have half of their inertia",

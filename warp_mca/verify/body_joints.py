@@ -79,7 +79,7 @@ def worlds(body: str, actuator: str = "") -> str:
 )
 def jointed_pendulums(setup: Setup) -> list[Row]:
     """Rigid links of 2 kg and 1 m, horizontal at rest at first, over a second."""
-    rows, samples = [], setup.choose((4000, 8000), (4000, 8000, 16000))
+    rows, samples = [], setup.choose((2000, 4000), (4000, 8000, 16000))
     for count, name in ((2, "double"), (3, "triple")):
         body = ""
         for k in reversed(range(count)):
@@ -142,7 +142,7 @@ def jointed_tree(setup: Setup) -> list[Row]:
     names, off, samples = (
         ("B_q1_m", "B_q2_rad", "C_q1_rad", "C_q2_rad"),
         [],
-        setup.choose((4000, 8000), (4000, 8000, 16000)),
+        setup.choose((2000, 4000), (4000, 8000, 16000)),
     )
     found = np.zeros(0)
     result = None
