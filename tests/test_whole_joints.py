@@ -62,7 +62,7 @@ def test_what_cannot_be_joined_is_refused(joint, said):
         ({"kind": "screw"}, "Freedom.kind = 'screw': choose hinge, slide or ball"),
         ({"kind": "ball", "stiffness": 1.0}, "Freedom ball.stiffness = 1.0: a ball has no axis for it"),
         ({"limits": (1.0, 0.0)}, "Freedom hinge.limits = (1.0, 0.0): give two finite numbers, the lower one first"),
-        ({"motor": 3.0}, "Freedom hinge.motor = 3.0: give an Amplitude of torques, a PositionServo, or None"),
+        ({"motor": 3.0}, "Freedom hinge.motor = 3.0: give an Amplitude of torques, a PositionServo"),
         ({"damping": -1.0}, "Freedom hinge.damping = -1.0: give a number from 0"),
     ],
 )
@@ -228,3 +228,58 @@ def test_a_position_at_the_start_turns_axes_and_targets_with_it():
         found.append(mca.run(scene, device="cpu")["joint_J_q1_rad"])
     assert found[0] - angle == pytest.approx(found[1], abs=1e-12)
     assert np.ptp(found[0]) > 0.1
+
+
+def controlled(function, period=1e-3):
+    """Two rotors that one function drives."""
+    motor = mca.Controller(function=function, period=period)
+    bodies = tuple(mca.Body(name=name, **LINK, position=(x, 0.0, 0.0)) for name, x in (("a", 0.0), ("b", 2.0)))
+    joints = tuple(
+        mca.Articulation(name=f"J{name}", body=name, freedoms=(mca.Freedom(motor=motor, damping=0.1),)) for name in "ab"
+    )
+    impact = mca.ImpactPhase(duration=0.05, output_interval=5e-4)
+    return mca.Scene(name="s", bodies=bodies, joints=joints, impact=impact)
+
+
+def test_a_function_drives_joints_and_is_held_between_its_calls():
+    seen = []
+
+    def spring(t, q, rate):
+        torque = -20.0 * (q - np.array([0.3, 0.6])) - rate
+        seen.append((t, q[0], torque[0]))
+        return torque
+
+    result = mca.run(controlled(spring), device="cpu")
+    assert [t for t, _, _ in seen] == pytest.approx(np.arange(50) * 1e-3)
+    asked = result["joint_Ja_q1_rad"][:-1:2]
+    assert asked == pytest.approx([q for _, q, _ in seen], abs=1e-15)
+    drive = result["joint_Ja_drive1_Nm"][1::2]  # means over the first halves of the time between two calls
+    assert drive == pytest.approx([torque for _, _, torque in seen], rel=1e-9)
+    assert result["joint_Jb_q1_rad"] == pytest.approx(2.0 * result["joint_Ja_q1_rad"], rel=1e-9)
+    assert np.abs(result["E_total_error"]).max() < 1e-6 * result["E_kinetic"].max()
+
+
+@pytest.mark.parametrize(
+    ("scene", "said"),
+    [
+        (
+            lambda: controlled(np.negative, 7e-4),
+            "Controller.period = 0.0007: give a multiple of ImpactPhase.output_int",
+        ),
+        (lambda: controlled(3.0), "Controller.function = 3.0: give a function of t, q and rate"),
+        (lambda: controlled(lambda t, q, rate: "x"), "at 0 s it gives x; return 2 finite numbers"),
+        (lambda: controlled(lambda t, q: q), "Controller.function = '<lambda>': it failed with TypeError"),
+    ],
+)
+def test_functions_that_cannot_drive_are_refused(scene, said):
+    with pytest.raises(mca.RequestError) as error:
+        mca.run(scene(), device="cpu")
+    assert said in str(error.value)
+
+
+def test_batches_and_model_files_take_no_functions(tmp_path):
+    scene = controlled(lambda t, q, rate: -q)
+    with pytest.raises(mca.RequestError, match="motor of joint Ja = 'Controller': a batch asks no functions"):
+        mca.run_batch([scene, scene], device="cpu")
+    with pytest.raises(mca.RequestError, match=r"Freedom.motor = 'Controller': a model file holds no functions"):
+        model_file.save(tmp_path / "a.mca", scene, mca.mesh(scene))
