@@ -7,10 +7,19 @@ import warp as wp
 
 from warp_mca.kernels.elements.formulation import MEAN, NODAL, OWN, Maker, load_function, parts_of
 from warp_mca.kernels.elements.viscosity import THERMAL
-from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.materials.isochoric import law_kinematics
 from warp_mca.kernels.materials.kinematics import kinematics
-from warp_mca.kernels.records.extremes import LAG_LOSS, STRAIN_SQUARE, VOLUME_LOSS
+from warp_mca.kernels.materials.laws import law_functions
+from warp_mca.kernels.records.extremes import (
+    LAG_LOSS,
+    PLASTIC_STRAIN,
+    RECORDS,
+    STRAIN_SQUARE,
+    VOLUME_LOSS,
+    VON_MISES,
+    keep_peak,
+)
 
 wp.set_module_options({"enable_backward": False})
 
@@ -82,6 +91,8 @@ def swelling_functions(precision: str, finite: bool, heated: bool) -> tuple[Any,
 def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = False, heated: bool = False) -> Any:
     """Kernel: elastic, plastic and hourglass energy [J], greatest strain and smallest Jacobian ratio [-] so far.
 
+    peak_out keeps the greatest von Mises stress [Pa] and plastic strain [-] of any record, see `records.extremes`.
+
     The points' own Jacobians are those of this step; of the steps between, the force kernels keep that of the centre.
     An inverted element's Q is a reflection, which would hide the inversion in its own frame.
     """
@@ -94,7 +105,8 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
     has_modes, lags = form.modes is not None, form.lags
     late = form.pressure == MEAN and not general  # one pass over the points: a second would not fit side by side
     k, R = law_kinematics(precision, law_name, finite), scalars(precision).real
-    dilatation_of, deviator, volumetric_energy = k.dilatation, k.deviator, k.volumetric_energy
+    dilatation_of, deviator, volumetric_energy, cauchy = k.dilatation, k.deviator, k.volumetric_energy, k.cauchy
+    flows = law_functions(law_name, precision).plastic_row >= 0
 
     # logarithms need all their digits
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
@@ -111,6 +123,7 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
         group: wp.array2d(dtype=wp.int32),
         dilatation: wp.array(dtype=R),
         energy_out: wp.array2d(dtype=R),
+        peak_out: wp.array2d(dtype=wp.float32),
     ):
         e = wp.tid()
         m = material[e]
@@ -128,16 +141,22 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
         dissipated = R(0.0)
         largest = extreme[STRAIN_SQUARE, e]
         smallest = R(1.0)
+        shear = R(0.0)
+        flow = R(0.0)
         for g in range(wp.static(points)):
             weight, H = gradient(shape, g)
-            strain, _N, _d = deviator(H)
+            strain, N, d = deviator(H)
             largest = wp.max(largest, wp.ddot(strain, strain))
             if wp.static(own):
                 theta = dilatation_of(H)
             if wp.static(late):
                 volume += weight
                 growth += dilatation_of(H) * weight
-            _S, _pressure, _p, stored, spent = read(strain, theta, G, place(g), e, m, flag, law, history)
+            S, _pressure, p, stored, spent = read(strain, theta, G, place(g), e, m, flag, law, history)
+            sigma = cauchy(H, S, N, d, R(0.0))  # pressure does not count
+            trace = wp.trace(sigma)
+            shear = wp.max(shear, wp.ddot(sigma, sigma) - R(THIRD) * trace * trace)
+            flow = wp.max(flow, p)
             if wp.static(own and not general):
                 stored += volumetric_energy(K, elastic_dilatation(theta, swelling))
             elastic += weight * stored
@@ -157,6 +176,11 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
         energy_out[1, first + e] = dissipated
         energy_out[3, first + e] = smallest
         energy_out[4, first + e] = hourglass
+        record = peak_out[wp.static(RECORDS), e]
+        keep_peak(wp.static(VON_MISES), e, wp.float32(wp.sqrt(R(1.5) * shear)), record, peak_out)
+        if wp.static(flows):
+            keep_peak(wp.static(PLASTIC_STRAIN), e, wp.float32(flow), record, peak_out)
+        peak_out[wp.static(RECORDS), e] = record + wp.float32(1.0)
 
     return element_energy
 
