@@ -88,6 +88,28 @@ def swelling_functions(precision: str, finite: bool, heated: bool) -> tuple[Any,
 
 
 @cache
+def peaks_function(precision: str, law_name: str, finite: bool, points: int) -> Any:
+    """The function that keeps von Mises stress and plastic strain of points where greatest, see `records.extremes`."""
+    t, cauchy = scalars(precision), law_kinematics(precision, law_name, finite).cauchy
+    R, vec3, mat33 = t.real, t.vec3, t.mat33
+    flows = law_functions(law_name, precision).plastic_row >= 0
+
+    @wp.func
+    def keep_peaks(e: int, g: int, H: mat33, S: mat33, N: mat33, d: vec3, p: R, peak_out: wp.array2d(dtype=wp.float32)):
+        sigma = cauchy(H, S, N, d, R(0.0))  # the pressure does not count
+        trace = wp.trace(sigma)
+        square = R(1.5) * wp.max(wp.ddot(sigma, sigma) - R(THIRD) * trace * trace, R(0.0))
+        record = peak_out[wp.static(RECORDS), e]
+        keep_peak(wp.static(VON_MISES), e, wp.float32(wp.sqrt(square)), record, peak_out)
+        if wp.static(flows):
+            keep_peak(wp.static(PLASTIC_STRAIN), e, wp.float32(p), record, peak_out)
+        last = wp.where(g == wp.static(points - 1), wp.float32(1.0), wp.float32(0.0))
+        peak_out[wp.static(RECORDS), e] = record + last
+
+    return keep_peaks
+
+
+@cache
 def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = False, heated: bool = False) -> Any:
     """Kernel: elastic, plastic and hourglass energy [J], greatest strain and smallest Jacobian ratio [-] so far.
 
@@ -105,8 +127,8 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
     has_modes, lags = form.modes is not None, form.lags
     late = form.pressure == MEAN and not general  # one pass over the points: a second would not fit side by side
     k, R = law_kinematics(precision, law_name, finite), scalars(precision).real
-    dilatation_of, deviator, volumetric_energy, cauchy = k.dilatation, k.deviator, k.volumetric_energy, k.cauchy
-    flows = law_functions(law_name, precision).plastic_row >= 0
+    dilatation_of, deviator, volumetric_energy = k.dilatation, k.deviator, k.volumetric_energy
+    keep_peaks = peaks_function(precision, law_name, finite, points)
 
     # logarithms need all their digits
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
@@ -136,13 +158,9 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
         theta, elastic, swelling = R(0.0), R(0.0), swelling_of(e, K, extreme)
         if wp.static(not late):
             theta, _pressure, elastic = shared(shape, e, K, swelling, group, dilatation)
-        volume = R(0.0)
-        growth = R(0.0)
-        dissipated = R(0.0)
+        volume, growth, dissipated = R(0.0), R(0.0), R(0.0)
         largest = extreme[STRAIN_SQUARE, e]
         smallest = R(1.0)
-        shear = R(0.0)
-        flow = R(0.0)
         for g in range(wp.static(points)):
             weight, H = gradient(shape, g)
             strain, N, d = deviator(H)
@@ -153,10 +171,7 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
                 volume += weight
                 growth += dilatation_of(H) * weight
             S, _pressure, p, stored, spent = read(strain, theta, G, place(g), e, m, flag, law, history)
-            sigma = cauchy(H, S, N, d, R(0.0))  # pressure does not count
-            trace = wp.trace(sigma)
-            shear = wp.max(shear, wp.ddot(sigma, sigma) - R(THIRD) * trace * trace)
-            flow = wp.max(flow, p)
+            keep_peaks(e, g, H, S, N, d, p, peak_out)
             if wp.static(own and not general):
                 stored += volumetric_energy(K, elastic_dilatation(theta, swelling))
             elastic += weight * stored
@@ -166,7 +181,8 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
             elastic += volume * volumetric_energy(K, elastic_dilatation(growth / volume, swelling))
         energy_out[0, first + e] = elastic
         energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * largest)
-        smallest = wp.min(smallest * wp.determinant(identity + rotation(shape)), R(1.0) - extreme[VOLUME_LOSS, e])
+        smallest = smallest * wp.determinant(identity + rotation(shape))
+        energy_out[3, first + e] = wp.min(smallest, R(1.0) - extreme[VOLUME_LOSS, e])
         hourglass = R(0.0)
         if wp.static(lags):
             hourglass = extreme[LAG_LOSS, e]
@@ -174,13 +190,7 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
             hourglass, spent = modes(shape, K, G, flag, history, e)
             dissipated += spent
         energy_out[1, first + e] = dissipated
-        energy_out[3, first + e] = smallest
         energy_out[4, first + e] = hourglass
-        record = peak_out[wp.static(RECORDS), e]
-        keep_peak(wp.static(VON_MISES), e, wp.float32(wp.sqrt(R(1.5) * shear)), record, peak_out)
-        if wp.static(flows):
-            keep_peak(wp.static(PLASTIC_STRAIN), e, wp.float32(flow), record, peak_out)
-        peak_out[wp.static(RECORDS), e] = record + wp.float32(1.0)
 
     return element_energy
 
