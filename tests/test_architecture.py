@@ -26,7 +26,7 @@ from warp_mca.physics.joints.coupling_stage import CouplingState
 from warp_mca.physics.loads.stage import LoadState
 from warp_mca.physics.rigid.stage import RigidState
 from warp_mca.step.solver import Solver
-from warp_mca.step.state import State
+from warp_mca.system.state import State
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")

@@ -12,7 +12,7 @@ from test_batch import hinged
 
 from warp_mca.base.joining import AS_IS, ITEMS, SCENE, join, joinable, of, offsets_of
 from warp_mca.model.batch_model import join_models
-from warp_mca.model.model import Model
+from warp_mca.system.model import Model
 
 
 def widened(item: Any, **more: object) -> Any:

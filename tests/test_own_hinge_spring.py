@@ -24,8 +24,8 @@ from warp_mca.scene.loads import Load
 if TYPE_CHECKING:
     from warp_mca.model.assembly import Assembly
     from warp_mca.step.solver import Solver
-    from warp_mca.step.stage import Step
-    from warp_mca.step.state import State
+    from warp_mca.system.stage import Step
+    from warp_mca.system.state import State
 
 
 @mca.register

@@ -9,7 +9,6 @@ import warp_mca as mca
 from warp_mca.model import stable_step as timestep
 from warp_mca.model.assembly import Assembly
 from warp_mca.model.build import build_model
-from warp_mca.model.model import Model
 from warp_mca.model.stable_step import Elements, stable_step
 from warp_mca.physics.elements import ELEMENTS
 from warp_mca.physics.elements.cells import nodal_masses
@@ -17,6 +16,7 @@ from warp_mca.physics.elements.hexahedron import eigenvalue_bounds, largest_eige
 from warp_mca.rigid.handoff import hand_off
 from warp_mca.step.solver import Solver
 from warp_mca.step.steps import Steps
+from warp_mca.system.model import Model
 
 STEEL = mca.Elastic(E=200e9, nu=0.3, rho=7800.0)
 H = 0.01

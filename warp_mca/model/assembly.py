@@ -12,8 +12,6 @@ from warp_mca.base.errors import bad_value
 from warp_mca.geometry.cell_types import CELL_TYPES
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.kernels.elements.patch_layout import PATCH
-from warp_mca.model.block import Block
-from warp_mca.model.failing import criterion_of, failing_of
 from warp_mca.model.stable_step import Elements, StableStep, at_elements, element_steps, stable_step
 from warp_mca.model.viscosity import thermal_strains, viscosities
 from warp_mca.physics.contact.stiffness import Inertia
@@ -31,6 +29,8 @@ from warp_mca.physics.elements.cells import (
 from warp_mca.physics.elements.patches import compact_order
 from warp_mca.scene import Point, Scene, Surface
 from warp_mca.scene.materials import Material
+from warp_mca.system.block import Block
+from warp_mca.system.failing import criterion_of, failing_of
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]

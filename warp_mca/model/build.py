@@ -13,8 +13,8 @@ from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.assembly import Assembly
 from warp_mca.model.damping import greatest_decay, with_damping
 from warp_mca.model.mass_scaling import check_masses, scale_masses
-from warp_mca.model.model import Model
 from warp_mca.model.own_steps import OwnSteps
+from warp_mca.model.rigid_step import bounce_factor, stable_with_rigid
 from warp_mca.model.viscosity import share_of_step, with_viscosity
 from warp_mca.physics.absorbing.nodes import absorbing_nodes
 from warp_mca.physics.contact.auto_penalty import ChosenPenalty
@@ -27,9 +27,9 @@ from warp_mca.physics.joints.constraints import check_bindings, constraints, fre
 from warp_mca.physics.loads.joint_loads import hinge_loads, movable_bases
 from warp_mca.physics.loads.nodal import LoadedNodes, loaded_nodes
 from warp_mca.physics.rigid.bodies import RigidBody, check_loads, flexible, own_nodes, rigid_bodies
-from warp_mca.physics.rigid.stable_step import bounce_factor, stable_with_rigid
 from warp_mca.physics.ties.nodes import check_ties, on_faces, tied_nodes, velocities
 from warp_mca.scene import ContactAll, RigidPlane, Scene
+from warp_mca.system.model import Model
 
 if TYPE_CHECKING:
     from warp_mca.rigid.chain import Chain

@@ -22,8 +22,8 @@ from warp_mca.physics.elements import ELEMENTS
 from warp_mca.physics.elements.patches import compact_order
 
 if TYPE_CHECKING:
-    from warp_mca.model.block import Block
-    from warp_mca.model.model import Model
+    from warp_mca.system.block import Block
+    from warp_mca.system.model import Model
 
 Levels = NDArray[np.int64]
 

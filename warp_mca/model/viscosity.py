@@ -16,8 +16,8 @@ from warp_mca.scene.loads import ThermalStrain
 
 if TYPE_CHECKING:
     from warp_mca.model.assembly import Assembly
-    from warp_mca.model.model import Model
     from warp_mca.physics.elements.cells import Cells
+    from warp_mca.system.model import Model
 
 LARGEST = 0.98  # share of the step that is stable for certain which a viscous model takes at most
 

@@ -15,14 +15,14 @@ from warp_mca.base.errors import GuardError
 from warp_mca.geometry.exposure import Exposure
 from warp_mca.model.assembly import Assembly
 from warp_mca.physics.contact.listed import as_settled, passes_of
-from warp_mca.physics.contact.renewal import renew
 from warp_mca.physics.contact.surfaces import ContactPass, Faces
 from warp_mca.scene import Contact, RigidPlane, Surface
+from warp_mca.step.contact_renewal import renew
 
 if TYPE_CHECKING:
     from warp_mca.phases.prepare import Prepared
     from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.state import State
 
 Mask = NDArray[np.bool_]
 

@@ -18,8 +18,8 @@ from warp_mca.physics.contact.resting import undamped
 
 if TYPE_CHECKING:
     from warp_mca.model.build import Grouping
-    from warp_mca.model.model import Model
     from warp_mca.scene import Scene
+    from warp_mca.system.model import Model
 
 MOST = 8  # groups: steps differ by 2^7 then
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.physics.absorbing.stage import AbsorbingStage
-from warp_mca.physics.actor import Actor
 from warp_mca.physics.contact.actor import Contacts
 from warp_mca.physics.elements.actor import Elements
 from warp_mca.physics.floating.stage import FloatingStage
@@ -22,10 +21,11 @@ from warp_mca.scene.loads import LOADS
 from warp_mca.step.node_stage import NodeStage
 from warp_mca.step.rated_nodes import node_stage
 from warp_mca.step.record_stage import RecordStage
+from warp_mca.system.actor import Actor
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
     from warp_mca.step.solver import Solver
+    from warp_mca.system.model import Model
 
 ACTORS: dict[str, Callable[[Solver], Actor]] = {
     "elements": Elements,

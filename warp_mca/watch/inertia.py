@@ -26,8 +26,8 @@ from warp_mca.watch.row import Array, Finished, Values, row
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
-    from warp_mca.model.model import Model
     from warp_mca.scene import Body
+    from warp_mca.system.model import Model
 
 TURNING = 1e-2  # energy of the rotation over twice that of the motion, below which inertia does not matter
 ROCKING = 1e-3  # the same over weight times size: bodies at rest rock on their contact springs

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from warp_mca.physics.contact.stage import ContactStage
     from warp_mca.physics.contact.surfaces import ContactPass, Faces
     from warp_mca.scene import Scene
-    from warp_mca.step.state import State
+    from warp_mca.system.state import State
 
 OPPOSED = -0.7  # cosine between the normals of a face and of one of the slave's around a node that it holds, at most
 BEYOND = 0.1  # of a face's width, by which glued nodes may lie beyond its edges, as on the chords of a coarse rim

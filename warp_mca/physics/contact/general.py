@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warp_mca.base.arrays import Array, Index
-from warp_mca.physics.contact.pairs import SLOTS, Pairs
 from warp_mca.physics.contact.resting import at_rest
 from warp_mca.physics.contact.sides import is_curved
 from warp_mca.physics.contact.skin_edges import edge_eigenvalues, general_edges
 from warp_mca.physics.contact.stiffness import CURVED, FLAT, node_mean
 from warp_mca.physics.contact.surfaces import LONGEST_LIST, ContactPass, Faces, surface_pass
 from warp_mca.scene import ContactAll, Surface
+from warp_mca.system.contact import SLOTS, Pairs
 
 if TYPE_CHECKING:
     from warp_mca.model.assembly import Assembly

@@ -21,8 +21,8 @@ from warp_mca.scene.contact_laws import ContactLaw, DampedPenalty, Penalty
 
 if TYPE_CHECKING:
     from warp_mca.model.assembly import Assembly
-    from warp_mca.model.model import Model
     from warp_mca.physics.contact.surfaces import Faces
+    from warp_mca.system.model import Model
 
 CRITICAL = 0.5  # share of the critical damping of a slave node on its spring
 

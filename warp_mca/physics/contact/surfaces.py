@@ -12,11 +12,11 @@ from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.geometry.cell_types import is_triangle
 from warp_mca.physics.contact.bonds import BondedNodes
 from warp_mca.physics.contact.friction_laws import friction_values
-from warp_mca.physics.contact.pairs import SLOTS, Pairs
 from warp_mca.physics.contact.sides import face_geometry, find_sides, is_curved, stiffest_fold
 from warp_mca.physics.contact.stiffness import node_mean, spring_stiffness
 from warp_mca.scene import Contact, ContactAll, RigidPlane
 from warp_mca.scene.contact_laws import law_values
+from warp_mca.system.contact import SLOTS, Pairs
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]

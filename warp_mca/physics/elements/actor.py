@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.elements import ELEMENTS
 from warp_mca.physics.elements.stage import BLOCK_DIM, ElementStage
 from warp_mca.physics.elements.state import ElementState
-from warp_mca.step.stage import SUMS, Stage, Step
+from warp_mca.system.actor import Actor, When
+from warp_mca.system.stage import SUMS, Stage, Step
 
 if TYPE_CHECKING:
     from warp_mca.step.solver import Solver

@@ -17,7 +17,7 @@ from warp_mca.base.arrays import Array, Index
 from warp_mca.scene import Body, Scene
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
+    from warp_mca.system.model import Model
 
 
 GAIN = 3.0  # measured with `hex8`

@@ -10,10 +10,10 @@ import numpy as np
 import warp as wp
 
 from warp_mca.kernels.nodes import floating
-from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.elements.stage import BLOCK_DIM
-from warp_mca.step.stage import Stage, Step
-from warp_mca.step.threads import NODES
+from warp_mca.system.actor import Actor, When
+from warp_mca.system.stage import Stage, Step
+from warp_mca.system.threads import NODES
 
 if TYPE_CHECKING:
     from warp_mca.step.solver import Solver

@@ -12,9 +12,9 @@ import warp as wp
 from warp_mca.kernels.nodes import slide
 from warp_mca.kernels.nodes.constraint import Bonds
 from warp_mca.kernels.nodes.gather import BOUND, TOUCHABLE
-from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.rigid.bodies import moves_with_rigid, rigid_nodes
-from warp_mca.step.stage import BESIDE, Stage
+from warp_mca.system.actor import Actor, When
+from warp_mca.system.stage import BESIDE, Stage
 
 if TYPE_CHECKING:
     from warp_mca.step.solver import Solver

@@ -13,8 +13,8 @@ from warp_mca.kernels.nodes import couple
 from warp_mca.kernels.nodes.cluster import Clusters, Sums
 from warp_mca.kernels.nodes.coupling import Inverse
 from warp_mca.kernels.nodes.hinge import Side
-from warp_mca.physics.actor import Actor, When
-from warp_mca.step.stage import ASIDE, BESIDE, Stage, Step
+from warp_mca.system.actor import Actor, When
+from warp_mca.system.stage import ASIDE, BESIDE, Stage, Step
 
 if TYPE_CHECKING:
     from warp_mca.step.solver import Solver

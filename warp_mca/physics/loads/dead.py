@@ -17,7 +17,7 @@ from warp_mca.physics.loads.faces import corner_areas, lone_corners
 from warp_mca.physics.loads.pushed import PushedNodes, TimedNodes
 from warp_mca.scene.loads import BodyForce, Force
 from warp_mca.scene.probes import Point
-from warp_mca.step.stage import Step
+from warp_mca.system.stage import Step
 
 if TYPE_CHECKING:
     from warp_mca.step.solver import Solver

@@ -17,7 +17,7 @@ from warp_mca.kernels.loads.nodes import DEAD, FOLLOWS, PRESSURE, LoadedFaces, p
 from warp_mca.model.assembly import Assembly
 from warp_mca.physics.loads.pushed import PushedNodes, TimedNodes
 from warp_mca.scene.loads import Pressure, Traction
-from warp_mca.step.stage import Step
+from warp_mca.system.stage import Step
 
 if TYPE_CHECKING:
     from warp_mca.step.solver import Solver

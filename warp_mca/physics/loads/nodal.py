@@ -16,7 +16,7 @@ from warp_mca.model.assembly import Assembly
 from warp_mca.scene.loads import LOADS, Load
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
+    from warp_mca.system.model import Model
 
 
 @joinable

@@ -15,11 +15,11 @@ from warp_mca.base.joining import AS_IS, joinable, offsets
 from warp_mca.kernels.loads.amplitude import Tables
 from warp_mca.physics.loads.nodal import LoadedNodes
 from warp_mca.physics.loads.nodal_stage import NodalLoad
-from warp_mca.step.stage import Step
+from warp_mca.system.stage import Step
 
 if TYPE_CHECKING:
     from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.state import State
 
 Index = NDArray[np.int32]
 

@@ -16,18 +16,18 @@ from warp_mca.base.joining import AS_IS, joinable, offsets
 from warp_mca.kernels.loads.thermal import Heated, Kept, heat_kernel, work_kernel
 from warp_mca.kernels.materials.laws import law_functions
 from warp_mca.model.assembly import Assembly
-from warp_mca.model.block import Block
-from warp_mca.physics.actor import When
 from warp_mca.physics.loads.nodal_stage import NodalLoad
 from warp_mca.physics.loads.pushed import TimedNodes, tables_of
 from warp_mca.scene.loads import ThermalStrain
-from warp_mca.step.stage import Stage as StepStage
-from warp_mca.step.stage import Step
+from warp_mca.system.actor import When
+from warp_mca.system.block import Block
+from warp_mca.system.stage import Stage as StepStage
+from warp_mca.system.stage import Step
 
 if TYPE_CHECKING:
     from warp_mca.physics.elements.stage import ElementStage
     from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.state import State
 
 
 @joinable

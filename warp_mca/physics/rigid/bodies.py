@@ -22,8 +22,8 @@ from warp_mca.physics.rigid.rows import RigidPin, RigidRow, check_joint, fixed_r
 from warp_mca.scene import Scene
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
     from warp_mca.rigid.chain import Chain
+    from warp_mca.system.model import Model
 
 
 @joinable

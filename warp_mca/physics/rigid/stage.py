@@ -17,17 +17,17 @@ from warp_mca.kernels.nodes.cluster import Clusters, Mean
 from warp_mca.kernels.nodes.rigid_motion import Poses, RigidBodies, RigidStep
 from warp_mca.kernels.nodes.rigid_rows import RigidRows
 from warp_mca.model.assembly import GROUND
-from warp_mca.physics.actor import Actor, When
-from warp_mca.step.stage import BESIDE, Stage, Step
-from warp_mca.step.threads import NODES, Split, whole
+from warp_mca.system.actor import Actor, When
+from warp_mca.system.stage import BESIDE, Stage, Step
+from warp_mca.system.threads import NODES, Split, whole
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
     from warp_mca.physics.joints.constraint_stage import ConstraintStage
     from warp_mca.physics.rigid.bodies import RigidBody
     from warp_mca.physics.rigid.rows import RigidPin, RigidRow
     from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.model import Model
+    from warp_mca.system.state import State
 
 
 BLOCK = 256  # threads of a GPU for a group of bodies

@@ -9,9 +9,9 @@ import numpy as np
 import warp as wp
 
 from warp_mca.kernels.nodes import tied
-from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.elements.stage import BLOCK_DIM
-from warp_mca.step.stage import BESIDE, Stage, Step
+from warp_mca.system.actor import Actor, When
+from warp_mca.system.stage import BESIDE, Stage, Step
 
 if TYPE_CHECKING:
     from warp_mca.step.solver import Solver

@@ -7,8 +7,6 @@ from dataclasses import dataclass, field
 
 from warp_mca.base.arrays import Array, Index
 from warp_mca.base.joining import ALONE, AS_IS, GIVEN, ITEMS, PART, joinable, of, offsets_of
-from warp_mca.model.block import Block
-from warp_mca.model.layout import Layout
 from warp_mca.model.mass_scaling import MassScaling
 from warp_mca.model.rates import Rates
 from warp_mca.model.stable_step import StableStep
@@ -23,6 +21,8 @@ from warp_mca.physics.loads.nodal import LoadedNodes
 from warp_mca.physics.rigid.bodies import RigidBody
 from warp_mca.physics.rigid.rows import RigidPin, RigidRow
 from warp_mca.physics.ties.nodes import TiedNodes
+from warp_mca.system.block import Block
+from warp_mca.system.layout import Layout
 
 
 @joinable

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from warp_mca.step.stage import Stage
-    from warp_mca.step.state import State
+    from warp_mca.system.stage import Stage
+    from warp_mca.system.state import State
 
 
 @dataclass(frozen=True)
