@@ -11,8 +11,9 @@ import numpy as np
 from warp_mca.base.arrays import Array
 from warp_mca.base.chunks import CHUNK, chunks
 from warp_mca.base.errors import bad_value
-from warp_mca.model.stable_step import StableStep, with_dashpots
+from warp_mca.model.stable_step import with_dashpots
 from warp_mca.scene.loads import ThermalStrain
+from warp_mca.system.time_step import StableStep
 
 if TYPE_CHECKING:
     from warp_mca.model.assembly import Assembly

@@ -20,10 +20,10 @@ from warp_mca.system.stage import Stage
 from warp_mca.system.threads import Split, whole
 
 if TYPE_CHECKING:
-    from warp_mca.model.rates import Rates
     from warp_mca.physics.elements.stage import ElementStage
     from warp_mca.step.solver import Solver
     from warp_mca.system.state import State
+    from warp_mca.system.time_step import Rates
 
 
 @dataclass(frozen=True)

@@ -46,11 +46,6 @@ class Solver(Made):
     """Advances states of a model on one device; it owns nothing that changes from step to step.
 
     Attributes:
-        model: that it advances.
-        layout: of the model's scenes.
-        dt: time step [s]; with `Model.rates` that of their substeps together.
-        threads: that compute; one on a GPU, and for a model that is too small to gain from more.
-        common_dt: time step of contacts and joints [s].
         actors: all that acts, in the order of `step.actors.actors_of`.
         output: what is read off the state for paths and recorders, or None.
         sensors: probes and sections.

@@ -1,14 +1,18 @@
-"""Owns what an actor is: one of the things that act on nodes, with its state, kernels and stages."""
+"""Owns what an actor is, one of the things that act on nodes, and the system of which it is made."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from warp_mca.system.layout import Layout
+    from warp_mca.system.model import Model
     from warp_mca.system.stage import Stage
     from warp_mca.system.state import State
+    from warp_mca.system.workspace import Workspace
 
 
 @dataclass(frozen=True)
@@ -27,7 +31,7 @@ class When:
 
 
 class Actor:
-    """Something that acts on nodes. It is made of a solver, on whose device it allocates; a State holds what changes.
+    """Something that acts on nodes. It is made of a `System`, on whose device it allocates; a State holds what changes.
 
     Attributes:
         block_dim: threads of a block of its kernels; None for Warp's own number.
@@ -56,3 +60,42 @@ class Actor:
 
     def start(self, state: State) -> None:
         """Take half a step back from t = 0, once free nodes have done so."""
+
+
+class System:
+    """A model on one device and all that acts on it; `step.solver.Solver` advances it.
+
+    Actors are attributes by their names, each made at its first use: whatever it reads of others is made before it.
+
+    Attributes:
+        kinds: what makes the actors, by name.
+        model: whose arrays they read.
+        layout: of the model's scenes.
+        device: as Warp names it.
+        precision: "mixed" or "float64".
+        threads: that compute; one on a GPU, and for a model that is too small to gain from more.
+        dt: time step [s]; with `Model.rates` that of their substeps together.
+        common_dt: time step of contacts and joints [s].
+    """
+
+    kinds: dict[str, Callable[[Any], Actor]]
+    model: Model
+    layout: Layout
+    device: str
+    precision: str
+    threads: int
+    dt: float
+    common_dt: float
+
+    @cached_property
+    def work(self) -> Workspace:
+        """The model on the device, and what a step computes and forgets."""
+        raise NotImplementedError
+
+    def __getattr__(self, name: str) -> Any:
+        """An actor, which stays."""
+        kinds = self.__dict__.get("kinds", {})
+        if name not in kinds:
+            raise AttributeError(name)
+        self.__dict__[name] = found = kinds[name](self)
+        return found

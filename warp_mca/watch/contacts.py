@@ -15,7 +15,7 @@ from warp_mca.scene import RigidPlane
 from warp_mca.watch.row import Array, Finished, Values, listed_passes, row
 
 if TYPE_CHECKING:
-    from warp_mca.physics.contact.surfaces import ContactPass
+    from warp_mca.system.contact import ContactPass
     from warp_mca.system.model import Model
 
 PATCH = 6.0  # nodes that carry a Hertzian contact three cells across: 8 / 9 of pi / 4 times 3 squared

@@ -19,9 +19,9 @@ from warp_mca.geometry.cell_types import CELL_TYPES, HEXAHEDRON, TETRA10, linear
 from warp_mca.geometry.hexahedron import CORNERS, shape_functions
 from warp_mca.geometry.quality import volumes
 from warp_mca.geometry.shape_volume import of_cells
-from warp_mca.model.assembly import GROUND
 from warp_mca.physics.elements.cells import body_cells, densities
 from warp_mca.rigid.body_motion import held_axes
+from warp_mca.system.bodies import GROUND
 from warp_mca.watch.row import Array, Finished, Values, row
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from warp_mca.system.columns import added_columns
 from warp_mca.system.stage import BESIDE, Stage, Step
 
 if TYPE_CHECKING:
-    from warp_mca.step.solver import Solver
+    from warp_mca.system.actor import System
     from warp_mca.system.state import State
 
 
@@ -51,7 +51,7 @@ class AbsorbingStage(Actor):
 
     block_dim = BLOCK_DIM
 
-    def __init__(self, solver: Solver) -> None:
+    def __init__(self, solver: System) -> None:
         """Allocate on the current device."""
         model, nodes, layout = solver.model, solver.nodes, solver.layout
         own, self.nodes, self.layout, self.records = model.absorbing, nodes, layout, solver.records

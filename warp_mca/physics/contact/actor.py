@@ -19,8 +19,8 @@ from warp_mca.system.actor import Actor, When
 from warp_mca.system.stage import BESIDE, BEYOND, LISTS, SPRINGS, Search, Stage, Step
 
 if TYPE_CHECKING:
-    from warp_mca.physics.contact.surfaces import ContactPass
-    from warp_mca.step.solver import Solver
+    from warp_mca.system.actor import System
+    from warp_mca.system.contact import ContactPass
     from warp_mca.system.model import Model
     from warp_mca.system.state import State
 
@@ -45,7 +45,7 @@ class Contacts(list[ContactStage], Actor):
 
     block_dim = contact.BLOCK_DIM
 
-    def __init__(self, solver: Solver) -> None:
+    def __init__(self, solver: System) -> None:
         """Allocate on the current device."""
         model, count = solver.model, len(solver.model.passes) // solver.layout.count
         scenes = [model.passes[k * count : (k + 1) * count] for k in range(solver.layout.count)]

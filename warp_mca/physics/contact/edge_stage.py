@@ -16,7 +16,7 @@ from warp_mca.physics.contact.per_scene import per_scene
 from warp_mca.physics.contact.skin_edges import EdgePass
 from warp_mca.physics.contact.slave_edges import new_springs
 from warp_mca.physics.contact.stage import ContactStage
-from warp_mca.physics.contact.surfaces import LIST_LENGTH
+from warp_mca.system.contact import LIST_LENGTH
 from warp_mca.system.threads import CONTACT, Split, whole
 
 if TYPE_CHECKING:

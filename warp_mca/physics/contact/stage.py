@@ -20,8 +20,7 @@ from warp_mca.physics.contact.dashpots import check_dashpots
 from warp_mca.physics.contact.friction_laws import friction_rows
 from warp_mca.physics.contact.per_scene import device_pairs, numbers, per_scene, vectors
 from warp_mca.physics.contact.slave_edges import SlaveEdges, faces_of_slaves, new_springs
-from warp_mca.physics.contact.surfaces import LIST_LENGTH, ContactPass
-from warp_mca.system.contact import SLOTS
+from warp_mca.system.contact import LIST_LENGTH, SLOTS, ContactPass
 from warp_mca.system.threads import CONTACT, Split, whole
 
 if TYPE_CHECKING:

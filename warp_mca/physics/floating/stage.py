@@ -16,7 +16,7 @@ from warp_mca.system.stage import Stage, Step
 from warp_mca.system.threads import NODES
 
 if TYPE_CHECKING:
-    from warp_mca.step.solver import Solver
+    from warp_mca.system.actor import System
 
 
 @dataclass(eq=False)
@@ -39,7 +39,7 @@ class FloatingStage(Actor):
 
     block_dim = BLOCK_DIM
 
-    def __init__(self, solver: Solver) -> None:
+    def __init__(self, solver: System) -> None:
         """Allocate on the current device."""
         model, work = solver.model, solver.work
         marker = model.floating.marker if model.floating else np.zeros((0, 4), np.int32)

@@ -17,7 +17,7 @@ from warp_mca.system.actor import Actor, When
 from warp_mca.system.stage import BESIDE, Stage
 
 if TYPE_CHECKING:
-    from warp_mca.step.solver import Solver
+    from warp_mca.system.actor import System
 
 
 @dataclass(eq=False)
@@ -54,7 +54,7 @@ class ConstraintStage(Actor):
         driven_first: first driven node of each scene, and the number of all, shape (scene_count + 1,), int32.
     """
 
-    def __init__(self, solver: Solver) -> None:
+    def __init__(self, solver: System) -> None:
         """Allocate on the current device."""
         self.solver, model = solver, solver.model
         nodes, place = np.unique(model.prescribed_node, return_inverse=True)

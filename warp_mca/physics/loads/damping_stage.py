@@ -18,7 +18,7 @@ from warp_mca.system.stage import MAIN, Step
 from warp_mca.system.threads import NODES
 
 if TYPE_CHECKING:
-    from warp_mca.step.solver import Solver
+    from warp_mca.system.actor import System
     from warp_mca.system.state import State
 
 
@@ -46,7 +46,7 @@ class DampingStage(NodalLoad):
 
     place, stream = "damp", MAIN
 
-    def __init__(self, solver: Solver, name: str) -> None:
+    def __init__(self, solver: System, name: str) -> None:
         """Allocate on the current device."""
         super().__init__(solver, name)
         items, dt, own = self.items, solver.common_dt, damping.DampedBodies()

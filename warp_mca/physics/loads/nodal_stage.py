@@ -17,7 +17,7 @@ from warp_mca.system.columns import added_columns
 from warp_mca.system.stage import BEYOND, Stage, Step
 
 if TYPE_CHECKING:
-    from warp_mca.step.solver import Solver
+    from warp_mca.system.actor import System
     from warp_mca.system.state import State
 
 
@@ -35,7 +35,7 @@ class NodalLoad(Actor):
     place: ClassVar[str] = "forces"
     stream: ClassVar[str] = BEYOND
 
-    def __init__(self, solver: Solver, name: str) -> None:
+    def __init__(self, solver: System, name: str) -> None:
         """Allocate on the current device."""
         self.solver, self.name, self.work = solver, name, solver.work
         self.items: Sequence[Any] = solver.model.loads[name]

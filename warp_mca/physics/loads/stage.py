@@ -18,8 +18,8 @@ from warp_mca.system.actor import Actor, When
 from warp_mca.system.stage import BESIDE, Stage, Step
 
 if TYPE_CHECKING:
-    from warp_mca.physics.loads.joint_loads import MovableBase
-    from warp_mca.step.solver import Solver
+    from warp_mca.system.actor import System
+    from warp_mca.system.loads import MovableBase
     from warp_mca.system.model import Model
     from warp_mca.system.state import State
 
@@ -78,7 +78,7 @@ class LoadStage(Actor):
         latest: impulse of each coupling in this step [N s], shape (coupling_count,), vec3d; empty without pinned bases.
     """
 
-    def __init__(self, solver: Solver) -> None:
+    def __init__(self, solver: System) -> None:
         """Allocate on the current device."""
         model, self.scenes = solver.model, solver.layout.count
         self.hinges, self.bases = model.hinge_loads, model.bases

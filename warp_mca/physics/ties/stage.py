@@ -14,7 +14,7 @@ from warp_mca.system.actor import Actor, When
 from warp_mca.system.stage import BESIDE, Stage, Step
 
 if TYPE_CHECKING:
-    from warp_mca.step.solver import Solver
+    from warp_mca.system.actor import System
 
 
 class TieStage(Actor):
@@ -26,7 +26,7 @@ class TieStage(Actor):
 
     block_dim = BLOCK_DIM
 
-    def __init__(self, solver: Solver) -> None:
+    def __init__(self, solver: System) -> None:
         """Allocate on the current device."""
         model, nodes = solver.model, solver.nodes
         self.nodes, self.count = nodes, len(model.ties)
