@@ -24,11 +24,11 @@ from warp_mca.phases.initial_overlap import settle_initial_overlap
 from warp_mca.phases.scene_run import SceneRun
 from warp_mca.physics.floating.frames import with_floating_frames
 from warp_mca.step.output import Output
-from warp_mca.step.records import SceneRecords
 from warp_mca.step.sensor_stage import SensorStage
 from warp_mca.step.solver import Solver
-from warp_mca.step.state import State
 from warp_mca.step.steps import Steps
+from warp_mca.system.records import SceneRecords
+from warp_mca.system.state import State
 from warp_mca.watch.passing import Watch
 
 if TYPE_CHECKING:

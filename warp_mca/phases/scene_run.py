@@ -37,8 +37,8 @@ from warp_mca.watch.table import told_at_the_end
 if TYPE_CHECKING:
     from warp_mca.phases.prepare import Prepared
     from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
     from warp_mca.step.steps import Steps
+    from warp_mca.system.state import State
     from warp_mca.watch.passing import Watch
 
 Array = NDArray[np.float64]

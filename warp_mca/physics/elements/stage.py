@@ -20,12 +20,12 @@ from warp_mca.kernels.loads import thermal
 from warp_mca.kernels.materials.laws import ROWS, law_functions, row_count
 from warp_mca.physics.elements.failing import failing_of
 from warp_mca.physics.elements.state import ElementState
-from warp_mca.step.threads import ELEMENTS, Split, whole
+from warp_mca.system.threads import ELEMENTS, Split, whole
 
 if TYPE_CHECKING:
-    from warp_mca.model.block import Block
-    from warp_mca.step.state import State
-    from warp_mca.step.workspace import Workspace
+    from warp_mca.system.block import Block
+    from warp_mca.system.state import State
+    from warp_mca.system.workspace import Workspace
 
 Index = NDArray[np.int32]
 
