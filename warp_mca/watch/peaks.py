@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
     from warp_mca.scene import Scene
     from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
     from warp_mca.step.steps import Steps
+    from warp_mca.system.state import State
 
 Peak = dict[str, Any]
 ROWS = {"max_von_mises": VON_MISES, "max_plastic_strain": PLASTIC_STRAIN}
