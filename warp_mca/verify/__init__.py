@@ -43,6 +43,7 @@ FILES = (
     "rigid_bodies",
     "body_joints",
     "joint_loops",
+    "jointed_impacts",
     "loads",
 )
 
