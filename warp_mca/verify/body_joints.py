@@ -119,14 +119,14 @@ def tree(steps: int, turn: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> mca.
         link("b", R @ [1.0, 0.0, 0.0], mass=1.0, centre=(0.3, 0.1, 0.0), rotation=turn),
         link("c", R @ [1.6, 0.1, 0.0], mass=0.5, centre=(0.3, 0.0, 0.0), inertia=(0.005, 0.003, 0.004), rotation=turn),
     )
-    cross = {"axis": (0.0, 1.0, 0.0), "second_axis": (0.0, 0.0, 1.0), "other_at": (0.6, 0.1, 0.0)}
+    y, z = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
     joints = (
         mca.Articulation(name="A", body="a", freedoms=(mca.Freedom(kind="ball", damping=0.3),)),
         mca.Articulation(name="B", body="b", other="a", other_at=(1.0, 0.0, 0.0), freedoms=(slide, hinge)),
-        mca.Universal(name="C", body="c", other="b", **cross),
+        mca.Universal(name="C", body="c", other="b", other_at=(0.6, 0.1, 0.0), axis=y, second_axis=z),
     )
-    x, y, z = (R @ [0.0, 0.0, -9.81]).tolist()
-    return machine(bodies, joints, steps, gravity=(x, y, z))
+    g = (R @ [0.0, 0.0, -9.81]).tolist()
+    return machine(bodies, joints, steps, gravity=(g[0], g[1], g[2]))
 
 
 @case(
