@@ -294,3 +294,20 @@ def test_batches_and_model_files_take_no_functions(tmp_path):
         mca.run_batch([scene, scene], device="cpu")
     with pytest.raises(mca.RequestError, match=r"Freedom.motor = 'Controller': a model file holds no functions"):
         model_file.save(tmp_path / "a.mca", scene, mca.mesh(scene))
+
+
+def test_welded_links_are_one_body():
+    """Without any freedom: two welded halves turn as a whole does, through the joint's force m_b w^2 r alone."""
+    w = (0.0, 0.0, 3.0)
+    bodies = (
+        mca.Body(name="a", **LINK, angular_velocity=w),
+        mca.Body(name="b", **LINK, position=(0.5, 0.0, 0.0), velocity=(0.0, 1.5, 0.0), angular_velocity=w),
+    )
+    impact = mca.ImpactPhase(duration=0.1, output_interval=1e-2, time_step_scale=0.1)
+    joint = mca.Weld(name="W", body="b", other="a")
+    result = mca.run(mca.Scene(name="s", bodies=bodies, joints=(joint,), impact=impact), device="cpu")
+    force = np.hypot(result["joint_W_Fx_N"], result["joint_W_Fy_N"])[1:]
+    assert force == pytest.approx(2.0 * 3.0**2 * 0.25, rel=1e-3)
+    assert result["E_kinetic"] == pytest.approx(result["E_kinetic"][0], rel=1e-12)
+    spins = [result.summary["rigid_bodies"][name]["spin"][2] for name in "ab"]
+    assert spins == pytest.approx([3.0 * 0.25] * 2, rel=1e-9)
