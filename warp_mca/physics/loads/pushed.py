@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from warp_mca.base.arrays import Array
 from warp_mca.base.joining import AS_IS, joinable, offsets
 from warp_mca.kernels.loads.amplitude import Tables
+from warp_mca.physics.actor import When
+from warp_mca.physics.loads.lasting import Lasting
 from warp_mca.physics.loads.nodal import LoadedNodes
 from warp_mca.physics.loads.nodal_stage import NodalLoad
-from warp_mca.step.stage import Step
+from warp_mca.step.stage import Stage, Step
 
 if TYPE_CHECKING:
     from warp_mca.step.solver import Solver
@@ -83,7 +85,11 @@ class PushedNodes(NodalLoad):
     Attributes:
         node: those under loads, in rising order, shape (count,), int32.
         order: entries of `listed` by node, of which those of each begin at `begin`.
+        lasting: what ends with elements that fail, or None; `ending` is the array that it writes.
     """
+
+    lasting: Lasting | None = None
+    ending: Any = None
 
     def __init__(self, solver: Solver, name: str) -> None:
         """Allocate on the current device."""
@@ -107,6 +113,22 @@ class PushedNodes(NodalLoad):
             work=wp.zeros(self.count, dtype=wp.float64),
             clock=wp.zeros(self.count, dtype=wp.int32),
         )
+
+    def may_end(self, nodes: Index, ending: Any) -> None:
+        """Let entries end with the elements that have all of their `nodes`, as `Lasting` takes these."""
+        if self.solver.model.fails:
+            self.ending = ending
+            self.lasting = Lasting(self.solver, nodes, wp.clone(ending))
+
+    def stages(self, when: When) -> Iterable[Stage]:
+        """Which loads have ended, ahead of the forces; those of `NodalLoad`."""
+        if when.common and self.lasting:
+            yield Stage("frames", f"ends of loads: {self.name}", self._end)
+        yield from super().stages(when)
+
+    def _end(self, step: Step) -> None:
+        assert self.lasting
+        self.lasting.renew(step.state, self.ending)
 
     def launch(self, kernel: Any, inputs: list[Any], step: Step, start: bool) -> None:
         """Launch a kernel of `kernels.loads.nodes`; `inputs` are those between the nodes and `v`."""
