@@ -64,6 +64,19 @@ def test_a_rigid_block_on_a_spring_is_a_damped_oscillator(damping: float, precis
     assert abs(result.summary["energy"]["error"]) < 1e-4 * 0.5 * M
 
 
+@pytest.mark.parametrize("times", [10.0, 1e4])
+def test_a_stiff_dashpot_stops_a_rigid_block_after_its_way(times: float):
+    """m v_0 / c, though rows are far apart; the dashpot takes all energy, which is there from the start."""
+    c = times * M * W
+    scene = hung(replace(SPRING, stiffness=0.0, damping=c), bodies=(moving(RIGID, 1.0),))
+    scene = replace(scene, impact=mca.ImpactPhase(duration=200.0 * M / c, output_interval=50.0 * M / c))
+    result = result_of(finished(scene, precision="float64"))
+    way = result["spring_s_m"][0] - result["spring_s_m"][-1]
+    assert way == pytest.approx(M / c, rel=3e-3)
+    energy = result.summary["energy"]
+    assert (energy["initial"], energy["damping"]) == pytest.approx((0.5 * M, 0.5 * M), rel=3e-3)
+
+
 def test_two_masses_swing_against_each_other_and_keep_their_momentum():
     """w^2 = k (1/m + 1/M) of a rigid block and one of three times its mass, between node sets and points."""
     heavy = replace(RIGID, name="b", material=replace(STEEL, rho=3.0 * STEEL.rho), position=(0.04, 0.0, 0.0))
