@@ -137,10 +137,11 @@ class PushedNodes(NodalLoad):
         outputs = [self.work.nodal_force, own.force, own.work, own.clock]
         wp.launch(kernel, self.count, inputs=given, outputs=outputs)
 
-    def feel(self, state: State, way: Array) -> None:
-        """Count the work of the forces of the latest step."""
+    def feel(self, state: State, ahead: State, way: Array) -> None:
+        """Count the work of the forces."""
         own = state.parts[self.name]
-        own.work.assign(own.work.numpy() + (own.force.numpy() * way[self.node]).sum(axis=1))
+        force = 0.5 * (own.force.numpy() + ahead.parts[self.name].force.numpy())
+        own.work.assign(own.work.numpy() + (force * way[self.node]).sum(axis=1))
 
     def energies_of(self, state: State) -> list[wp.array]:
         """Work."""
