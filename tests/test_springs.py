@@ -133,6 +133,20 @@ def test_a_preload_and_a_length_shift_the_swing():
         assert abs(result.summary["energy"]["error"]) < 1e-3 * 0.5 * K * shift**2
 
 
+@pytest.mark.parametrize("damping", [0.0, 0.2 * M * W])
+def test_a_preload_alone_is_a_constant_force(damping: float):
+    """v = P / c (1 - exp(-c t / m)), or P t / m; the spring gives P times the way."""
+    pull, c = 2.0, damping
+    spring = replace(SPRING, stiffness=0.0, preload=pull, damping=c, direction=(1.0, 0.0, 0.0))
+    result = result_of(finished(hung(spring, periods=0.1), precision="float64"))
+    t = result.time
+    v = pull / c * -np.expm1(-c * t / M) if c else pull * t / M
+    assert np.abs(result["tip_vx"] - v)[1:].max() < 2e-3 * v[-1]
+    way = result["spring_s_m"][0] - result["spring_s_m"]
+    assert result["E_spring"] == pytest.approx(-pull * way, abs=1e-9)
+    assert abs(result.summary["energy"]["error"]) < 1e-3 * 0.5 * M * v[-1] ** 2
+
+
 def test_tables_of_force_and_of_damping_agree_with_an_integration_of_their_own():
     """m x'' = T(-x, -x'), by SciPy: extension and compression, the ends of the table passed, stiff and soft parts."""
     spring = replace(SPRING, stiffness=0.0, **TABLE, **DAMPER)
@@ -254,7 +268,7 @@ def test_the_summary_lists_springs():
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"stiffness": 0.0}, r"Spring s.stiffness = 0.0: nothing pulls in"),
+        ({"stiffness": 0.0}, r"Spring s.stiffness = 0.0: nothing pulls; give it"),
         ({"stiffness": -1.0}, r"Spring s.stiffness = -1.0: give a number from 0"),
         ({"at": None}, r"Spring s.at = None: give either a point by at="),
         ({"nodes": "xmax"}, r"Spring s.at = \(0.0, 0.0, 0.0\): give either"),
@@ -263,7 +277,7 @@ def test_the_summary_lists_springs():
         ({"other": "b", "other_at": None}, r"Spring s.other_at = None: give either a point by other_at="),
         ({"direction": (0.0, 0.0, 0.0)}, r"Spring s.direction = \(0.0, 0.0, 0.0\): give a direction other than zero"),
         ({"elongations": (0.0, 1.0), "forces": (0.0, 1.0)}, r"Spring s.stiffness = 100.0: leave it out"),
-        ({"stiffness": 0.0, "elongations": (0.0, 1.0), "forces": (0.0,)}, r"Spring s.forces = 'tuple': give two"),
+        ({"stiffness": 0.0, "elongations": (0.0, 1.0), "forces": (0.0,)}, r"Spring s.forces = \(0.0,\): give two"),
         ({"stiffness": 0.0, "elongations": (1.0, 0.0), "forces": (0.0, 1.0)}, r"Spring s.elongations = .*increasing"),
         ({"speeds": (0.0, 1.0), "damping_forces": (0.0, -1.0)}, r"Spring s.damping_forces = .*a dashpot resists"),
     ],
