@@ -11,7 +11,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.elements.formulation import OWN, SPLIT, Maker, load_function, own_modulus_function, parts_of
+from warp_mca.kernels.elements.formulation import OWN, SPLIT, Maker, load_function, modulus_functions, parts_of
 from warp_mca.kernels.elements.readings import shared_function
 from warp_mca.kernels.failure.criteria import criterion, parameter_type, point_type
 from warp_mca.kernels.hardware.block import block_sum
@@ -68,7 +68,7 @@ def point_function(maker: Maker, precision: str, law_name: str, finite: bool) ->
     """
     form, point, place = parts_of(maker, precision, law_name, finite)
     struct, gradient, general, read = form.struct, form.gradient, point.general, point.read
-    own, own_modulus = form.pressure in (OWN, SPLIT), own_modulus_function(precision, form.pressure == SPLIT)
+    own, (own_modulus, _) = form.pressure in (OWN, SPLIT), modulus_functions(precision, form.pressure == SPLIT)
     k, R, Point = law_kinematics(precision, law_name, finite), scalars(precision).real, point_type(precision)
     dilatation_of, deviator, pressure_of, cauchy, volume_strain = (
         k.dilatation,
@@ -128,7 +128,7 @@ def failure_kernel(maker: Maker, failure: str, precision: str, law_name: str, fi
     form, _, _ = parts_of(maker, precision, law_name, finite)
     load = load_function(maker, precision, law_name, finite)
     points, corners, plastic = form.points, form.corners, bool(law_name)
-    splits, own_modulus = form.pressure == SPLIT, own_modulus_function(precision, form.pressure == SPLIT)
+    _, mean_modulus = modulus_functions(precision, form.pressure == SPLIT)
     shared, seen = (make(maker, precision, law_name, finite) for make in (shared_function, point_function))
     damage, width = criterion(failure, precision)
     R, vec3, row = scalars(precision).real, scalars(precision).vec3, parameter_type(precision, width)
@@ -165,9 +165,7 @@ def failure_kernel(maker: Maker, failure: str, precision: str, law_name: str, fi
             if wp.static(plastic):
                 flag = yielded[e]
             shape = load(X, u, conn, e, m, flag, law, history)
-            K = law[m, 0]
-            if wp.static(splits):
-                K = K - own_modulus(K, law[m, 1])
+            K = mean_modulus(law[m, 0], law[m, 1])
             theta, pressure, _energy = shared(shape, e, K, R(0.0), group, dilatation)
             c = row()
             for i in range(wp.static(width)):

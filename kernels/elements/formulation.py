@@ -31,7 +31,7 @@ class Formulation:
         name: of the element.
         corners, points: numbers of its nodes and of its integration points.
         pressure: from which change of volume it comes: OWN of each point, MEAN of the element, NODAL of the pressure
-            nodes of each corner, which `ElementStage.nodal` gives; SPLIT, OWN with the K of `own_modulus_function` and
+            nodes of each corner, which `ElementStage.nodal` gives; SPLIT, OWN with the K of `modulus_functions` and
             MEAN with the rest.
         struct: what the functions below need of an element.
         load: (X, u, conn, e) -> struct.
@@ -69,8 +69,9 @@ Maker = Callable[[str, str, bool], Formulation]  # of a precision, a law, and wh
 
 
 @cache
-def own_modulus_function(precision: str, splits: bool) -> Any:
-    """The function (K, G) -> bulk modulus of the change of volume that each point has to itself [Pa]."""
+def modulus_functions(precision: str, splits: bool) -> tuple[Any, Any]:
+    """Functions (K, G) -> bulk modulus of a point's own change of volume, and of the mean one [Pa]; all of K, each,
+    where the pressure is not split."""
     R = scalars(precision).real
 
     @wp.func
@@ -79,7 +80,13 @@ def own_modulus_function(precision: str, splits: bool) -> Any:
             return wp.min(K, R(OWN_SHARE) * G)
         return K
 
-    return own_modulus
+    @wp.func
+    def mean_modulus(K: R, G: R):
+        if wp.static(splits):
+            return K - wp.min(K, R(OWN_SHARE) * G)
+        return K
+
+    return own_modulus, mean_modulus
 
 
 @wp.func

@@ -11,7 +11,7 @@ import warp as wp
 
 from warp_mca.kernels.elements import hex8i_points, hex8i_vectors
 from warp_mca.kernels.elements.failure import failure_kernel
-from warp_mca.kernels.elements.formulation import OWN, SPLIT, Formulation, own_modulus_function
+from warp_mca.kernels.elements.formulation import OWN, SPLIT, Formulation, modulus_functions
 from warp_mca.kernels.elements.hex8i_small import elastic_function, plastic_tractions_function, stress_function
 from warp_mca.kernels.elements.hexahedron import load_function, store_function
 from warp_mca.kernels.elements.internal_modes import mode_functions, place_functions
@@ -117,7 +117,7 @@ def formulation(points: int, precision: str, law_name: str, finite: bool) -> For
     read_vectors, _ = hex8i_vectors.vector_functions(precision, law_name, points)
     plastic_tractions = plastic_tractions_function(precision, law_name, points)
     splits = hex8i_points.splits(precision, law_name, finite)
-    own_modulus = own_modulus_function(precision, splits)
+    own_modulus, _ = modulus_functions(precision, splits)
 
     @wp.struct
     class Hex8i:

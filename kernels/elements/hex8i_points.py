@@ -22,7 +22,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.elements.formulation import own_modulus_function
+from warp_mca.kernels.elements.formulation import modulus_functions
 from warp_mca.kernels.elements.hex8i_small import internal_function
 from warp_mca.kernels.elements.hex8i_vectors import closed_form_function, corrected_function, vector_functions
 from warp_mca.kernels.elements.internal_modes import mode_functions, place_functions
@@ -95,9 +95,21 @@ def sums_function(precision: str, law_name: str, finite: bool, points: int) -> A
     column_place, layer_place, layer_count = *place_functions(precision, points), points // 4
     point = material_point(precision, law_name, finite, points)
     general, update, has_mean = point.general, point.update, splits(precision, law_name, finite)
-    own_modulus = own_modulus_function(precision, has_mean)
+    own_modulus, mean_modulus = modulus_functions(precision, has_mean)
     k = law_kinematics(precision, law_name, finite)
     dilatation_of, deviator, pressure_of, nominal = k.dilatation, k.deviator, k.pressure, k.nominal
+
+    @wp.func
+    def mean_dilatation(H: mat33, L0: mat33, L1: mat33, L2: mat33, N0: mat33, N1: mat33, N2: mat33):
+        growth = R(0.0)
+        for column in range(4):
+            xi, eta = column_place(column)
+            middle = (H + xi * L0) + eta * (L1 + xi * N2)
+            slope = (L2 + xi * N1) + eta * N0
+            for k in range(wp.static(layer_count)):
+                zeta, weight = layer_place(k)
+                growth += weight * dilatation_of(middle + zeta * slope)
+        return growth
 
     @wp.func
     def point_sums(
@@ -120,25 +132,12 @@ def sums_function(precision: str, law_name: str, finite: bool, points: int) -> A
         shared = R(0.0)
         if wp.static(has_mean):
             if K < law[m, 0]:
-                growth = R(0.0)
-                for column in range(4):
-                    xi, eta = column_place(column)
-                    middle = (H + xi * L0) + eta * (L1 + xi * N2)
-                    slope = (L2 + xi * N1) + eta * N0
-                    for k in range(wp.static(layer_count)):
-                        zeta, weight = layer_place(k)
-                        growth += weight * dilatation_of(middle + zeta * slope)
-                shared = pressure_of(law[m, 0] - K, growth)
+                shared = pressure_of(mean_modulus(law[m, 0], G), mean_dilatation(H, L0, L1, L2, N0, N1, N2))
         flag_new = flag
         mean = mat33()
-        R0 = mat33()
-        R1 = mat33()
-        R2 = mat33()
-        M0 = mat33()
-        M1 = mat33()
-        M2 = mat33()
-        largest = R(0.0)
-        stress2 = R(0.0)
+        R0, R1, R2 = mat33(), mat33(), mat33()
+        M0, M1, M2 = mat33(), mat33(), mat33()
+        largest, stress2 = R(0.0), R(0.0)
         for column in range(4):
             xi, eta = column_place(column)
             middle = (H + xi * L0) + eta * (L1 + xi * N2)
@@ -186,7 +185,7 @@ def stress_function(precision: str, law_name: str, finite: bool, points: int) ->
     closed_form, corrected = closed_form_function(precision), corrected_function(precision, law_name, finite)
     read_vectors, write_vectors = vector_functions(precision, law_name, points)
     point_sums, plastic = sums_function(precision, law_name, finite, points), bool(law_name)
-    own_modulus = own_modulus_function(precision, splits(precision, law_name, finite))
+    own_modulus, _ = modulus_functions(precision, splits(precision, law_name, finite))
 
     @wp.func
     def conjugate(R0: mat33, R1: mat33, R2: mat33, y: mat33, last: vec3):

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from warp_mca.phases.impact import Impact
     from warp_mca.phases.scene_run import SceneRun
     from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.state import State
 
 Array = NDArray[np.float64]
 STEPS = 10  # between two looks at the kinetic energy at most

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.state import State
 
 
 def max_plastic_strain(solver: Solver, state: State, scene: int = 0) -> float:

@@ -11,8 +11,8 @@ from warp_mca.base.arrays import Index
 from warp_mca.kernels.loads.lasting import close_faces, close_shares, find_lasting
 
 if TYPE_CHECKING:
-    from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.actor import System
+    from warp_mca.system.state import State
 
 
 class Lasting:
@@ -25,7 +25,7 @@ class Lasting:
         lasts: whether each of these does, shape (count,), int32.
     """
 
-    def __init__(self, solver: Solver, nodes: Index, whole: Any) -> None:
+    def __init__(self, solver: System, nodes: Index, whole: Any) -> None:
         """Allocate on the current device.
 
         Args:

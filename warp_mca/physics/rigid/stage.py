@@ -16,18 +16,17 @@ from warp_mca.kernels.nodes import rigid_body
 from warp_mca.kernels.nodes.cluster import Clusters, Mean
 from warp_mca.kernels.nodes.rigid_motion import Poses, RigidBodies, RigidStep
 from warp_mca.kernels.nodes.rigid_rows import RigidRows
-from warp_mca.model.assembly import GROUND
-from warp_mca.physics.actor import Actor, When
-from warp_mca.step.stage import BESIDE, Stage, Step
-from warp_mca.step.threads import NODES, Split, whole
+from warp_mca.system.actor import Actor, When
+from warp_mca.system.bodies import GROUND
+from warp_mca.system.stage import BESIDE, Stage, Step
+from warp_mca.system.threads import NODES, Split, whole
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
     from warp_mca.physics.joints.constraint_stage import ConstraintStage
-    from warp_mca.physics.rigid.bodies import RigidBody
-    from warp_mca.physics.rigid.rows import RigidPin, RigidRow
-    from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.actor import System
+    from warp_mca.system.model import Model
+    from warp_mca.system.rigid import RigidBody, RigidPin, RigidRow
+    from warp_mca.system.state import State
 
 
 BLOCK = 256  # threads of a GPU for a group of bodies
@@ -66,7 +65,7 @@ def groups_of(bodies: Sequence[RigidBody], rows: Sequence[RigidRow]) -> list[lis
 class RigidStage(Actor):
     """What `kernels.nodes.rigid_body` reads and writes; of no use for a model without rigid bodies."""
 
-    def __init__(self, solver: Solver) -> None:
+    def __init__(self, solver: System) -> None:
         """Allocate on the current device."""
         model, nodes = solver.model, solver.nodes
         self.model, self.nodes, self.work, self.dt = model, nodes, nodes.work, nodes.dt

@@ -8,7 +8,7 @@ from warp_mca.kernels.records.columns import PASS, PASS_COLUMNS
 from warp_mca.scene.loads import LOADS
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
+    from warp_mca.system.model import Model
 
 
 FAILURE = "failure"  # entry of the ledger: elastic and hourglass energy that went with elements that failed
