@@ -53,7 +53,7 @@ def renew(solver: Solver, state: State, passes: Sequence[ContactPass]) -> None:
         before = [
             (stage.items[0], stage.sides, _read(own)) for stage, own in zip(contacts, state.contacts, strict=True)
         ]
-        v, dt = state.v.numpy(), solver.nodes.dt
+        v, dt = np.array(state.v.numpy(), dtype=np.float64), solver.nodes.dt
         for item, sides, springs in before:
             moved = dt * (springs["force"] * _relative(item, sides, springs, v)).sum(axis=1)
             springs["let_go"] = springs["energy"] - 0.5 * moved
