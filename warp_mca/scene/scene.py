@@ -176,12 +176,12 @@ class Scene:
                 remedy = f"give {' or '.join(PHASES)}; register other classes by warp_mca.register"
                 raise bad_value(f"Scene.phases[{k}]", validate.brief(phase), remedy)
         if self.phases and self.failing:
-            raise bad_value("Scene.phases", "given", f"elements of {self.failing[0]} may fail in an impact alone")
+            raise bad_value("Scene.phases", self.phases, f"elements of {self.failing[0]} may fail in an impact alone")
         timed = {"rigid": self.rigid, "prescribed": self.prescribed}
-        timed |= {"loads": [load for load in self.loads if not load.is_constant]}
+        timed |= {"loads": [load.title for load in self.loads if not load.is_constant]}
         for name, given in timed.items() if self.phases else ():
             if given:
-                raise bad_value(f"Scene.{name}", "given", "its times count from the impact; leave it or phases out")
+                raise bad_value(f"Scene.{name}", given, "its times count from the impact; leave it or phases out")
 
     @property
     def _held(self) -> tuple[Fixed | Prescribed | Absorbing, ...]:
