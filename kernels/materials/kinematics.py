@@ -121,6 +121,26 @@ def kinematics(precision: str, finite: bool) -> Kinematics:
     return _logarithmic(precision) if finite else _small(precision)
 
 
+@cache
+def cofactor_function(precision: str) -> Any:
+    """The function H -> (J F^-T, J) of F = I + H."""
+    t = scalars(precision)
+    R, vec3, mat33 = t.real, t.vec3, t.mat33
+
+    @wp.func
+    def cofactor(H: mat33):
+        F = wp.identity(n=3, dtype=R) + H
+        r0 = vec3(F[0, 0], F[0, 1], F[0, 2])
+        r1 = vec3(F[1, 0], F[1, 1], F[1, 2])
+        r2 = vec3(F[2, 0], F[2, 1], F[2, 2])
+        k0 = wp.cross(r1, r2)
+        k1 = wp.cross(r2, r0)
+        k2 = wp.cross(r0, r1)
+        return mat33(k0[0], k0[1], k0[2], k1[0], k1[1], k1[2], k2[0], k2[1], k2[2]), wp.dot(r0, k0)
+
+    return cofactor
+
+
 def _small(precision: str) -> Kinematics:
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
@@ -176,7 +196,7 @@ def _small(precision: str) -> Kinematics:
 def _logarithmic(precision: str) -> Kinematics:
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
-    principal, natural_log = eigen_function(precision), log_function(precision)
+    principal, natural_log, cofactor = eigen_function(precision), log_function(precision), cofactor_function(precision)
 
     @wp.func
     def log_over(x: R):
@@ -219,19 +239,9 @@ def _logarithmic(precision: str) -> Kinematics:
         return P + H * P
 
     @wp.func
-    def log_cofactor(H: mat33):
-        F = wp.identity(n=3, dtype=R) + H
-        r0 = vec3(F[0, 0], F[0, 1], F[0, 2])
-        r1 = vec3(F[1, 0], F[1, 1], F[1, 2])
-        r2 = vec3(F[2, 0], F[2, 1], F[2, 2])
-        k0 = wp.cross(r1, r2)
-        k1 = wp.cross(r2, r0)
-        k2 = wp.cross(r0, r1)
-        return mat33(k0[0], k0[1], k0[2], k1[0], k1[1], k1[2], k2[0], k2[1], k2[2])
-
-    @wp.func
     def log_nominal(H: mat33, S: mat33, N: mat33, d: vec3, pressure: R):
-        return log_deviatoric(H, S, N, d) + pressure * log_cofactor(H)
+        k, _J = cofactor(H)
+        return log_deviatoric(H, S, N, d) + pressure * k
 
     @wp.func
     def log_pressure(K: R, theta: R):
