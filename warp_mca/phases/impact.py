@@ -138,7 +138,8 @@ class Impact:
         self.state.save(path, self.solver.model, self.solver.dt, more)
 
     def divide_anew(self, steps: Steps) -> list[SceneRecords]:
-        """Go on with other intervals of the same time step: rows begin anew, energies and extremes go on.
+        """Go on with other intervals of the same time step: rows and peaks of stress begin anew, energies and extremes
+        go on.
 
         Returns:
             What each scene has recorded so far.
@@ -146,6 +147,8 @@ class Impact:
         earlier = self.state.scenes
         self.state.scenes = [records.without_rows(self.state.steps * self.solver.dt) for records in earlier]
         self.state.steps = 0
+        for own in self.state.elements:
+            own.peak.zero_()
         self.take(steps)
         return earlier
 
