@@ -43,6 +43,12 @@ def eigen_function(precision: str) -> Any:
         return cosine, cosine * tangent, tangent
 
     @wp.func
+    def rotate(p: R, q: R, pq: R, pr: R, qr: R, n_p: vec3, n_q: vec3):
+        """Entries pp, qq, pr, qr and both directions after the rotation that makes pq zero; r is the third axis."""
+        c, s, t = jacobi_rotation(p, q, pq)
+        return p - t * pq, q + t * pq, c * pr - s * qr, s * pr + c * qr, c * n_p - s * n_q, s * n_p + c * n_q
+
+    @wp.func
     def jacobi_eigen(C: mat33):
         xx = C[0, 0]
         yy = C[1, 1]
@@ -54,36 +60,12 @@ def eigen_function(precision: str) -> Any:
         n1 = vec3(R(0.0), R(1.0), R(0.0))
         n2 = vec3(R(0.0), R(0.0), R(1.0))
         for _ in range(wp.static(SWEEPS)):
-            c, s, t = jacobi_rotation(xx, yy, xy)
-            xx = xx - t * xy
-            yy = yy + t * xy
+            xx, yy, xz, yz, n0, n1 = rotate(xx, yy, xy, xz, yz, n0, n1)
             xy = R(0.0)
-            a = xz
-            xz = c * a - s * yz
-            yz = s * a + c * yz
-            n = n0
-            n0 = c * n - s * n1
-            n1 = s * n + c * n1
-            c, s, t = jacobi_rotation(xx, zz, xz)
-            xx = xx - t * xz
-            zz = zz + t * xz
+            xx, zz, xy, yz, n0, n2 = rotate(xx, zz, xz, xy, yz, n0, n2)
             xz = R(0.0)
-            a = xy
-            xy = c * a - s * yz
-            yz = s * a + c * yz
-            n = n0
-            n0 = c * n - s * n2
-            n2 = s * n + c * n2
-            c, s, t = jacobi_rotation(yy, zz, yz)
-            yy = yy - t * yz
-            zz = zz + t * yz
+            yy, zz, xy, xz, n1, n2 = rotate(yy, zz, yz, xy, xz, n1, n2)
             yz = R(0.0)
-            a = xy
-            xy = c * a - s * xz
-            xz = s * a + c * xz
-            n = n1
-            n1 = c * n - s * n2
-            n2 = s * n + c * n2
         return wp.matrix_from_cols(n0, n1, n2), vec3(xx, yy, zz)
 
     return jacobi_eigen
