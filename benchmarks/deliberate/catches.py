@@ -88,7 +88,7 @@ CATCHES: dict[str, tuple[str, ...]] = {
     "wrist": ("cluster_moment_lost",),
     "jointed_strike": ("rotor_halved", "joint_forgets_second"),
     "four_bar_loop": ("joint_forgets_second",),
-    "slider_and_cross": ("freedom_not_carried",),
+    "slider_and_cross": ("freedoms_in_reverse",),
     "joint_drives": ("rotor_halved",),
     "rigid_ball": ("reaction_halved", "contact_soft"),
     "pressure_pulse": ("pressure_on_faces_halved",),

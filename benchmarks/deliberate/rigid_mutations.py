@@ -35,6 +35,12 @@ RIGID_MUTATIONS: dict[str, Mutation] = {
         "            tail = then(freedom_pose(e, joints, state, step_out), tail)",
         "            tail = then(tail, tail)",
     ),
+    "freedoms_in_reverse": Mutation(
+        "the second freedom of a joint carries the first",
+        "kernels/nodes/rigid_joints.py",
+        "            found = then(found, freedom_pose(e, joints, state, step))",
+        "            found = then(freedom_pose(e, joints, state, step), found)",
+    ),
     "rotor_halved": Mutation(
         "rotors in joints have half of their inertia",
         "kernels/nodes/joint_drives.py",
