@@ -14,7 +14,7 @@ import numpy as np
 
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.geometry import Cad, MeshFile
-from warp_mca.scene import Contact, ContactAll, RigidPlane, Scene
+from warp_mca.scene import Contact, ContactAll, Controller, RigidPlane, Scene
 from warp_mca.scene.materials import Elastic
 
 if TYPE_CHECKING:
@@ -162,14 +162,17 @@ def _limit(scene: Scene, device: str, meshes: Mapping[str, Mesh] | None) -> int:
 
 def _step_key(scene: Scene, options: RunOptions, number: int) -> object:
     """Equal for scenes that may share a batch: those of one duration, step, and kind of contacts."""
-    if scene.t_end is not None or options.multi_rate is not None:
+    whole = [(joint.name, found) for joint in scene.joints if (found := joint.whole())]
+    asked = any(isinstance(freedom.motor, Controller) for _, joint in whole for freedom in joint.freedoms)
+    if scene.t_end is not None or options.multi_rate is not None or asked:
         return number
     impact = scene.impact
     span = impact.duration if options.duration is None else options.duration
     digest = hashlib.sha256()
     for body in scene.bodies:
         key = body.name, body.geometry, _elastic(body), body.element, body.kinematics, body.rigid, body.exact_mass
-        _feed(digest, (*key, body.across))
+        _feed(digest, (*key, body.across, body.mass, body.centre, body.inertia))
+    _feed(digest, whole)
     for contact in scene.contacts:
         _feed(digest, _contact_key(contact))
     _feed(digest, (scene.refine, impact.time_step_scale, impact.mass_scaling))
