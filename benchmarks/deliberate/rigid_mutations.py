@@ -23,4 +23,28 @@ RIGID_MUTATIONS: dict[str, Mutation] = {
         "poses_out.spin[b] - size *",
         "poses_out.spin[b] - wp.float64(0.0) * size *",
     ),
+    "joint_forgets_second": Mutation(
+        "joints between whole bodies act on the second one at its mass centre",
+        "kernels/nodes/rigid_joints.py",
+        "        step_out.lever[r, 1] = wp.quat_rotate_inv(poses.rotation[b], wp.cross(other, n) + t)",
+        "        step_out.lever[r, 1] = wp.quat_rotate_inv(poses.rotation[b], t)",
+    ),
+    "freedom_not_carried": Mutation(
+        "the first freedom of a joint does not carry the second",
+        "kernels/nodes/rigid_joints.py",
+        "            tail = then(freedom_pose(e, joints, state, step_out), tail)",
+        "            tail = then(tail, tail)",
+    ),
+    "rotor_halved": Mutation(
+        "rotors in joints have half of their inertia",
+        "kernels/nodes/joint_drives.py",
+        "            A = joints.drive[e, wp.static(ARMATURE)]",
+        "            A = wp.float64(0.5) * joints.drive[e, wp.static(ARMATURE)]",
+    ),
+    "cluster_moment_lost": Mutation(
+        "joints give the face of a flexible body no moment",
+        "kernels/nodes/rigid_joints.py",
+        "        step_out.twist[r] = -t\n",
+        "        step_out.twist[r] = wp.float64(0.0) * t\n",
+    ),
 }

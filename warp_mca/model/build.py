@@ -25,13 +25,12 @@ from warp_mca.physics.contact.surfaces import surface_faces
 from warp_mca.physics.joints.constraints import check_bindings, constraints, free_nodes, join_bodies, nodes_of
 from warp_mca.physics.loads.joint_loads import hinge_loads, movable_bases
 from warp_mca.physics.loads.nodal import loaded_nodes
-from warp_mca.physics.rigid.bodies import check_loads, flexible, own_nodes, rigid_bodies
+from warp_mca.physics.rigid.bodies import Rigid, check_loads, flexible, own_nodes, rigid_bodies
 from warp_mca.physics.ties.nodes import check_ties, on_faces, tied_nodes, velocities
 from warp_mca.scene import ContactAll, RigidPlane, Scene
 from warp_mca.system.contact import ChosenPenalty, ContactPass
 from warp_mca.system.loads import LoadedNodes
 from warp_mca.system.model import Model
-from warp_mca.system.rigid import RigidBody
 
 if TYPE_CHECKING:
     from warp_mca.rigid.chain import Chain
@@ -110,10 +109,10 @@ def build_model(
     added[absorbing.node] += absorbing.eigenvalues(parts.mass)
     loads = loaded_nodes(parts, start, added, grouping is not None)
     rigid = rigid_bodies(parts, pairs, joints, couplings, passes, loads, velocity)
-    check_ties(ties, held, [nodes_of(pairs), absorbing.node, *(body.nodes for body in rigid.bodies)])
+    check_ties(ties, held, [nodes_of(pairs), absorbing.node, *(body.nodes for body in rigid.rigid_bodies)])
     added, parts.relief = ties.shared(added, parts.mass), ties.relief(parts.mass)
     found: dict[str, Any] = {**_bodies(parts, watched), **held, **pairs}
-    found |= _steps(parts, rigid.bodies, added, velocity, passes, loads)
+    found |= _steps(parts, rigid, added, velocity, passes, loads)
     model = Model(
         V=velocity,
         **found,
@@ -128,9 +127,7 @@ def build_model(
         passes=passes,
         contact_axes=axes,
         penalties=penalties,
-        rigid_bodies=rigid.bodies,
-        rigid_rows=rigid.rows,
-        rigid_pins=rigid.pins,
+        **rigid._asdict(),
     )
     return grouping(model, OwnSteps(parts, added, share_of_step(parts, velocity))) if grouping else model
 
@@ -156,14 +153,14 @@ def _bodies(parts: Assembly, watched: Sequence[tuple[str, int]]) -> dict[str, An
 
 def _steps(
     parts: Assembly,
-    bodies: Sequence[RigidBody],
+    rigid: Rigid,
     added: Array,
     velocity: Array,
     passes: Sequence[ContactPass],
     loads: Mapping[str, Sequence[LoadedNodes]],
 ) -> dict[str, Any]:
     """Stable step and mass scaling, by the name of the attribute; mass scaling raises the masses of the assembly."""
-    plain = stable_with_rigid(parts, bodies, added, velocity) if bodies else parts.stable(added)
+    plain = stable_with_rigid(parts, rigid, added, velocity) if rigid.rigid_bodies else parts.stable(added)
     stable, scaling = scale_masses(parts, added, plain)
     decay = sum(item.decay for item in passes) + greatest_decay(loads, parts.mass)
     stable = with_damping(with_viscosity(stable, parts, velocity, decay), parts, loads, added, decay)

@@ -41,6 +41,9 @@ FILES = (
     "rigid",
     "hinges",
     "rigid_bodies",
+    "body_joints",
+    "joint_loops",
+    "jointed_impacts",
     "loads",
 )
 

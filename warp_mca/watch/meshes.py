@@ -131,7 +131,7 @@ def coarse_shape(c: Context, most: float) -> Iterator[Values]:
 def free_joint_node(c: Context, _: float) -> Iterator[Values]:
     """Nodes of joints where two bodies meet that bind only some of them, as meshes that differ there leave."""
     for joint, pairs in zip(c.scene.joints, c.model.joints, strict=True):
-        if joint.other is None or not isinstance(joint, (Prismatic, Weld)):
+        if joint.other is None or not isinstance(joint, (Prismatic, Weld)) or joint.nodes is None:
             continue
         assert joint.other_nodes is not None
         sides = ((joint.body, joint.nodes), (joint.other, joint.other_nodes))
@@ -189,7 +189,7 @@ def _foreign(c: Context) -> Iterator[tuple[str, Mesh]]:
 def _missing_mass(c: Context, most: float, exact: bool) -> Iterator[Values]:
     for body in c.scene.bodies:
         coarse = (np.abs(1.0 / c.meshes[body.name].volume_ratio - 1.0) > most).any()
-        if coarse and body.exact_mass == exact:
+        if coarse and body.exact_mass == exact and body.mass is None:
             error = body_report([body], c.meshes)[body.name]["mass_error"]
             if error is not None and abs(error) > most:
                 yield dict(body=body.name, share=abs(error), than="less" if error < 0.0 else "more")

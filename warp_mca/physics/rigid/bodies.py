@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
+from warp_mca.physics.rigid.joining import join_whole
 from warp_mca.physics.rigid.rows import check_joint, fixed_rows, joint_rows, pin_of, pin_rows
 from warp_mca.scene import Scene
 from warp_mca.system.bodies import GROUND, Bodies
+from warp_mca.system.body_joints import BodyJoint
 from warp_mca.system.contact import ContactPass
 from warp_mca.system.joints import Coupling, JointPairs
 from warp_mca.system.loads import LoadedNodes, MovableBase
@@ -24,11 +26,12 @@ if TYPE_CHECKING:
 
 
 class Rigid(NamedTuple):
-    """Rigid bodies of a scene, rows and pins, as `Model` has them."""
+    """Rigid bodies of a scene, rows, pins and joints, as `Model` has them."""
 
-    bodies: tuple[RigidBody, ...] = ()
-    rows: tuple[RigidRow, ...] = ()
-    pins: tuple[RigidPin, ...] = ()
+    rigid_bodies: tuple[RigidBody, ...] = ()
+    rigid_rows: tuple[RigidRow, ...] = ()
+    rigid_pins: tuple[RigidPin, ...] = ()
+    body_joints: tuple[BodyJoint, ...] = ()
 
 
 def own_nodes(parts: Bodies) -> dict[str, Index]:
@@ -95,7 +98,8 @@ def rigid_bodies(
         owner[own] = place
     _check_drives(parts)
     coupled = {item.start: item for item in couplings}
-    for joint, found in zip(parts.scene.joints, joints, strict=True):
+    tied = [item for item in zip(parts.scene.joints, joints, strict=True) if item[0].whole() is None]
+    for joint, found in tied:
         check_joint(joint, pairs, found, owner, found.start in coupled)
     touched = np.zeros(len(parts.X), dtype=bool)
     for item in passes:
@@ -105,7 +109,7 @@ def rigid_bodies(
     bodies = [_body(parts, name, own, touched, pairs, owner) for name, own in nodes.items()]
     pins: list[RigidPin] = []
     rows = []
-    for found in joints:
+    for _, found in tied:
         if found.start in coupled and (item := pin_of(coupled[found.start], pairs, owner)):
             rows += pin_rows(item, len(pins), found.start, bool(owner[pairs["joint_first"][found.start]] == GROUND))
             pins.append(item)
@@ -113,7 +117,8 @@ def rigid_bodies(
             rows += joint_rows(parts, pairs, found, owner, coupled.get(found.start))
     for place, body in enumerate(bodies):
         rows += fixed_rows(parts, place, body.name, body.centre, body.radius, velocity)
-    return Rigid(tuple(bodies), tuple(rows), tuple(pins))
+    whole = join_whole(parts, pairs, joints, bodies, velocity, len(pins))
+    return Rigid(tuple(bodies), (*rows, *whole.rows), (*pins, *whole.pins), whole.joints)
 
 
 def _check_drives(parts: Bodies) -> None:
