@@ -8,8 +8,8 @@ import warp as wp
 from warp_mca.kernels.contact.edge_shares import slid_off
 from warp_mca.kernels.contact.edges import SlaveFaces
 from warp_mca.kernels.contact.pairs import Pairs, may_meet, spring_of
-from warp_mca.kernels.contact.projection import project_on_face
-from warp_mca.kernels.contact.search import EQUAL, distance_to_face, is_listed, root_function
+from warp_mca.kernels.contact.projection import distance_to_face, project_on_face
+from warp_mca.kernels.contact.search import EQUAL, is_listed, root_function
 from warp_mca.kernels.contact.spring import ANY_DEPTH, Spring
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 

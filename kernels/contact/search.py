@@ -7,7 +7,7 @@ import warp as wp
 
 from warp_mca.kernels.contact.edges import SlaveFaces
 from warp_mca.kernels.contact.pairs import Pairs, may_meet, spring_of
-from warp_mca.kernels.contact.projection import area_vector, interpolate, project_on_face, weights_at
+from warp_mca.kernels.contact.projection import area_vector, distance_to_face, project_on_face
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 
 # Entries of the flag array that the host reads with every batch of records.
@@ -191,32 +191,6 @@ def candidates_kernel(each: bool, sides: int, general: bool = False) -> Any:
                     flag_out[k, OVERFLOW] = 1
 
     return find_candidates
-
-
-@wp.func
-def distance_to_face(
-    X: wp.array(dtype=wp.vec3d),
-    u: wp.array(dtype=wp.vec3d),
-    face: wp.array2d(dtype=wp.int32),
-    f: int,
-    x: wp.vec3d,
-    at: wp.vec2d,
-    triangle: bool,
-) -> wp.float64:
-    """Distance of a point to a face, whose natural coordinates `at` of the foot may lie beyond its edges [m]."""
-    one = wp.float64(1.0)
-    on = wp.vec2d(wp.clamp(at[0], -one, one), wp.clamp(at[1], -one, one))
-    if triangle:
-        on = wp.vec2d(wp.max(at[0], wp.float64(0.0)), wp.max(at[1], wp.float64(0.0)))
-        on = on / wp.max(on[0] + on[1], one)
-    foot = interpolate(
-        weights_at(on, triangle),
-        X[face[f, 0]] + u[face[f, 0]] - x,
-        X[face[f, 1]] + u[face[f, 1]] - x,
-        X[face[f, 2]] + u[face[f, 2]] - x,
-        X[face[f, 3]] + u[face[f, 3]] - x,
-    )
-    return wp.length(foot)
 
 
 @cache
