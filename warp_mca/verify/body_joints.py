@@ -19,7 +19,7 @@ INERTIA = (0.02, 0.03, 0.025)
 REFERENCE_STEP = 1e-4  # of MuJoCo's Runge-Kutta scheme of order 4 [s]
 
 
-def link(name: str, at: Sequence[float] = (0.0, 0.0, 0.0), **more: Any) -> mca.Body:
+def link(name: str, at: Sequence[float] | Array = (0.0, 0.0, 0.0), **more: Any) -> mca.Body:
     """A rigid link of 2 kg whose mass centre lies 0.5 m along x."""
     own: dict[str, Any] = {"mass": 2.0, "inertia": INERTIA, "centre": (0.5, 0.0, 0.0)}
     return mca.Body(name=name, rigid=True, position=(float(at[0]), float(at[1]), float(at[2])), **(own | more))
@@ -48,15 +48,16 @@ def pendulum_chain(count: int, steps: int) -> mca.Scene:
 
 def mujoco_positions(xml: str, rows: int, control: Sequence[float] = ()) -> Array:
     """qpos of a MuJoCo model over a second, shape (rows + 1, position_count), float64."""
-    import mujoco  # pyright: ignore[reportMissingImports]
+    import mujoco
 
-    model = mujoco.MjModel.from_xml_string(xml)
-    data = mujoco.MjData(model)
+    library: Any = mujoco
+    model = library.MjModel.from_xml_string(xml)
+    data = library.MjData(model)
     data.ctrl[:] = control
     found = [data.qpos.copy()]
     for _ in range(rows):
         for _ in range(round(1.0 / rows / REFERENCE_STEP)):
-            mujoco.mj_step(model, data)
+            library.mj_step(model, data)
         found.append(data.qpos.copy())
     return np.array(found)
 
