@@ -1,0 +1,221 @@
+"""Owns the equations of motion of a machine: MuJoCo's, with loops exact and limits and dry friction as in an impact."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warp_mca.base.arrays import Array
+from warp_mca.base.errors import bad_value
+from warp_mca.robots.reading import Names, compiled, filled, mujoco
+
+if TYPE_CHECKING:
+    from warp_mca.robots.robot import Robot
+
+LIMIT_RATE = 2000.0  # of the spring of a limit on the inertia of its joint [rad/s], with critical damping
+FRICTION_RATE = 1e-2  # rate over which dry friction builds up, as in `RigidPhase.friction_rate` [rad/s, m/s]
+LOOP_RATE = 100.0  # at which gaps of loops decay (Baumgarte, Comput. Methods Appl. Mech. Eng. 1 (1972) 1) [1/s]
+CLOSED = 1e-8  # gap of a loop at the start [m, rad]
+NUDGE = 1e-6  # time for the difference that gives J' v [s]
+
+
+class Machine:
+    """A robot's model, its data at the latest time asked for, and forces that MuJoCo does not compute here.
+
+    y holds coordinates and rates, then the work of drives and of all other forces but gravity and springs [J].
+
+    Attributes:
+        model, data: of MuJoCo.
+        names: of what the model holds.
+        ctrl: controls that are held, shape (nu,), float64.
+        limited: index of the rate of each joint with a limit, int.
+        limit_stiffness: of these limits [N m/rad, N/m], float64.
+        limit_damping: of these limits [N m s/rad, N s/m], float64.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        """Compile the file and set the start.
+
+        Raises:
+            RequestError: the file, or the start, is not one of a machine.
+        """
+        self._mj: Any = mujoco("Robot.file", robot.path)
+        self.model: Any = compiled(robot)
+        self.data: Any = self._mj.MjData(self.model)
+        self._beside: Any = self._mj.MjData(self.model)
+        self.names = Names(self._mj, self.model)
+        self.nq, self.nv = int(self.model.nq), int(self.model.nv)
+        scalar = self.model.jnt_type >= int(self._mj.mjtJoint.mjJNT_SLIDE)
+        joints = np.flatnonzero(self.model.jnt_limited.astype(bool) & scalar)
+        self._range, self.limited = self.model.jnt_range[joints], self.model.jnt_dofadr[joints]
+        self._limited_q, self._friction = self.model.jnt_qposadr[joints], self.model.dof_frictionloss.copy()
+        self.ctrl = np.zeros(self.model.nu)
+        self.start = self._start(robot)
+        self._check_limits(joints)
+        inertia = 1.0 / np.diag(np.linalg.inv(self.mass_matrix()))[self.limited]
+        self.limit_stiffness = inertia * LIMIT_RATE**2
+        self.limit_damping = 2.0 * inertia * LIMIT_RATE
+
+    def _start(self, robot: Robot) -> Array:
+        """Coordinates and rates at the start, shape (nq + nv,), float64; sets the controls too."""
+        model, data, names = self.model, self.data, self.names
+        self._mj.mj_resetData(model, data)
+        if robot.keyframe is not None:
+            keys = [self._mj.mj_id2name(model, int(self._mj.mjtObj.mjOBJ_KEY), k) for k in range(model.nkey)]
+            if robot.keyframe not in keys:
+                raise bad_value(
+                    "Robot.keyframe", robot.keyframe, f"the file's are {', '.join(filter(None, keys)) or 'none'}"
+                )
+            self._mj.mj_resetDataKeyframe(model, data, keys.index(robot.keyframe))
+        ends = {"q": [*model.jnt_qposadr, self.nq], "v": [*model.jnt_dofadr, self.nv]}
+        place = lambda key: lambda k: slice(int(ends[key][k]), int(ends[key][k + 1]))  # noqa: E731
+        q = filled("Robot.qpos", robot.qpos, np.array(data.qpos), names.joints, place("q"), "joint")
+        v = filled("Robot.qvel", robot.qvel, np.array(data.qvel), names.joints, place("v"), "joint")
+        one = lambda k: slice(k, k + 1)  # noqa: E731
+        ctrl = np.array(data.ctrl)
+        for name, servo in robot.servos.items():
+            ctrl[names.actuators.index(name)] = servo.target
+        self.ctrl = filled("Robot.ctrl", robot.ctrl, ctrl, names.actuators, one, "actuator")
+        y = np.concatenate([q, v])
+        self._set(self.data, y)
+        self._mj.mj_fwdPosition(model, data)
+        self._check_loops()
+        return y
+
+    def _check_limits(self, joints: Array) -> None:
+        for k, joint in enumerate(joints):
+            q = float(self.start[self._limited_q[k]])
+            low, high = self._range[k]
+            if not low <= q <= high:
+                field = f"Robot.qpos of joint {self.names.joint(int(joint))}"
+                raise bad_value(field, q, f"start within its limits, {low:g} to {high:g}")
+
+    def _check_loops(self) -> None:
+        """Refuse a start that opens loops."""
+        if not self.data.nefc:
+            return
+        self._mj.mj_fwdVelocity(self.model, self.data)
+        for field, value, unit in (
+            ("qpos", self.data.efc_pos, "m or rad"),
+            ("qvel", self.data.efc_vel, "m/s or rad/s"),
+        ):
+            if (worst := float(np.abs(value).max())) > CLOSED:
+                remedy = f"it opens the loops of the file by {worst:.3g} {unit}; give one that keeps them closed"
+                raise bad_value(f"Robot.{field}", "as given", remedy)
+
+    def _set(self, data: Any, y: Array) -> None:
+        data.qpos[:], data.qvel[:] = y[: self.nq], y[self.nq : self.nq + self.nv]
+        self._mj.mj_normalizeQuat(self.model, data.qpos)
+
+    def place(self, q: Array) -> Any:
+        """The data with all frames at coordinates q."""
+        if not np.array_equal(self.data.qpos, q):
+            self.data.qpos[:] = q
+            self._mj.mj_normalizeQuat(self.model, self.data.qpos)
+        self._mj.mj_kinematics(self.model, self.data)
+        return self.data
+
+    def coordinate_rates(self, q: Array, v: Array) -> Array:
+        """q' of coordinates q at rates v, shape (nq,), float64: v itself, of quaternions q' = q (0, omega) / 2."""
+        rates = np.empty(self.nq)
+        for kind, at, dof in zip(self.model.jnt_type, self.model.jnt_qposadr, self.model.jnt_dofadr, strict=True):
+            if kind >= int(self._mj.mjtJoint.mjJNT_SLIDE):
+                rates[at] = v[dof]
+                continue
+            if kind == int(self._mj.mjtJoint.mjJNT_FREE):
+                rates[at : at + 3], at, dof = v[dof : dof + 3], at + 3, dof + 3
+            w, x, y, z = q[at : at + 4]
+            a, b, c = v[dof : dof + 3]
+            product = (-x * a - y * b - z * c, w * a + y * c - z * b, w * b + z * a - x * c, w * c + x * b - y * a)
+            rates[at : at + 4] = 0.5 * np.array(product)
+        return rates
+
+    def own_forces(self, q: Array, v: Array) -> Array:
+        """Generalised forces of limits and dry friction, shape (nv,), float64.
+
+        A limit presses with k d + c d' where the joint is beyond it by d > 0, and never pulls. Dry friction is its
+        whole force times tanh(rate / FRICTION_RATE).
+        """
+        force = -self._friction * np.tanh(v / FRICTION_RATE)
+        at, rate = q[self._limited_q], v[self.limited]
+        for depth, sign in ((at - self._range[:, 1], 1.0), (self._range[:, 0] - at, -1.0)):
+            press = np.maximum(self.limit_stiffness * depth + self.limit_damping * sign * rate, 0.0)
+            force[self.limited] -= np.where(depth > 0.0, sign * press, 0.0)
+        return force
+
+    def advance(self, y: Array) -> Any:
+        """The data with all forces and accelerations at y."""
+        mj, model, data = self._mj, self.model, self.data
+        self._set(data, y)
+        data.ctrl[:] = self.ctrl
+        data.qfrc_applied[:] = self.own_forces(data.qpos, data.qvel)
+        mj.mj_fwdPosition(model, data)
+        mj.mj_fwdVelocity(model, data)
+        mj.mj_fwdActuation(model, data)
+        mj.mj_fwdAcceleration(model, data)
+        return data
+
+    def rates(self, _t: float, y: Array) -> Array:
+        """y' at time t [s], shape (nq + nv + 2,), float64."""
+        data = self.advance(y)
+        v = y[self.nq : self.nq + self.nv]
+        a = data.qacc_smooth + self._loop_acceleration()
+        others = data.qfrc_damper + data.qfrc_applied + data.qfrc_gravcomp
+        work = (v @ data.qfrc_actuator, v @ others)
+        return np.concatenate([self.coordinate_rates(y[: self.nq], v), a, work])
+
+    def _loop_acceleration(self) -> Array | float:
+        """M^-1 J^T lambda that keeps loops closed: J a = -J' v - 2 w J v - w^2 gap, w = LOOP_RATE."""
+        data = self.data
+        if not data.nefc:
+            return 0.0
+        J, v = self.loop_jacobian(), np.array(data.qvel)
+        ahead, behind = (self._loop_rate(sign * NUDGE) for sign in (1.0, -1.0))
+        wanted = -(ahead - behind) / (2.0 * NUDGE) - 2.0 * LOOP_RATE * (J @ v) - LOOP_RATE**2 * data.efc_pos
+        W = np.linalg.solve(self.mass_matrix(), J.T)
+        return W @ np.linalg.lstsq(J @ W, wanted - J @ data.qacc_smooth, rcond=1e-10)[0]
+
+    def _loop_rate(self, span: float) -> Array:
+        """J v a time [s] later at the same rates."""
+        beside = self._beside
+        beside.qpos[:] = self.data.qpos
+        self._mj.mj_integratePos(self.model, beside.qpos, self.data.qvel, span)
+        self._mj.mj_fwdPosition(self.model, beside)
+        return np.array(beside.efc_J).reshape(beside.nefc, self.nv) @ self.data.qvel
+
+    def loop_jacobian(self) -> Array:
+        """J of the loops at the latest data, shape (row_count, nv), float64; (0, nv) of a tree."""
+        return np.array(self.data.efc_J).reshape(self.data.nefc, self.nv)
+
+    def mass_matrix(self) -> Array:
+        """M at the latest data, with armature [kg, kg m, kg m^2], shape (nv, nv), float64."""
+        M = np.zeros((self.nv, self.nv))
+        self._mj.mj_fullM(self.model, self.data, M)
+        return M
+
+    def mobility(self) -> Array:
+        """Rates over generalised impulses at the latest data, M^-1 less what loops take, shape (nv, nv), float64."""
+        inverse, J = np.linalg.inv(self.mass_matrix()), self.loop_jacobian()
+        W = inverse @ J.T
+        return inverse - W @ np.linalg.pinv(J @ W, rcond=1e-10, hermitian=True) @ W.T if len(J) else inverse
+
+    def energies(self, y: Array) -> tuple[float, float]:
+        """Kinetic energy, and that less works, plus the potential of gravity and springs, at y [J]."""
+        data = self.advance(y)
+        self._mj.mj_energyPos(self.model, data)
+        kinetic = 0.5 * float(data.qvel @ self.mass_matrix() @ data.qvel)
+        return kinetic, kinetic + float(data.energy[0]) - float(y[-2:].sum())
+
+    def point_jacobian(self, body: int, point: Array) -> Array:
+        """d(velocity of a point that moves with a body) / d(rates) at the latest data, shape (3, nv), float64."""
+        J = np.zeros((3, self.nv))
+        self._mj.mj_jac(self.model, self.data, J, None, np.asarray(point, dtype=np.float64), body)
+        return J
+
+    def pace(self, v: Array) -> float:
+        """Rate at which frames turn or cross the machine [rad/s], for the longest step."""
+        extent = max(float(self.model.stat.extent), 1e-9)
+        slides = np.isin(self.model.jnt_type[self.model.dof_jntid], (int(self._mj.mjtJoint.mjJNT_SLIDE),))
+        rates = np.abs(np.where(slides, v / extent, v))
+        return float(max(rates.max(initial=0.0), np.sqrt(np.linalg.norm(self.model.opt.gravity) / extent)))
