@@ -62,6 +62,12 @@ SOUND: dict[type, Any] = {
     mca.Weld: mca.Weld(name="W", body="up", nodes="ymax"),
     mca.Spherical: mca.Spherical(name="S", body="up", at=(0.0, 0.0, 0.0)),
     mca.Prismatic: mca.Prismatic(name="P", body="up", nodes="ymax", axis=(1.0, 0.0, 0.0)),
+    geometry.InertiaBrick: geometry.InertiaBrick(mass=1.0, centre=(0.0, 0.0, 0.0), inertia=(1.0, 1.0, 1.0)),
+    mca.Freedom: mca.Freedom(at=(0.0, 0.0, 0.0), stiffness=1.0, limits=(0.0, 1.0)),
+    mca.PositionServo: mca.PositionServo(kp=1.0, kv=0.1, target=0.5, limits=(-1.0, 1.0)),
+    mca.Articulation: mca.Articulation(name="A", body="low", freedoms=(mca.Freedom(),)),
+    mca.Universal: mca.Universal(name="U", body="low", axis=(1.0, 0.0, 0.0), second_axis=(0.0, 1.0, 0.0)),
+    mca.Cylindrical: mca.Cylindrical(name="C", body="low", axis=(1.0, 0.0, 0.0)),
     mca.Fixed: mca.Fixed(body="low", nodes="ymin"),
     mca.PointMass: mca.PointMass(body="low", mass=1e-3, at=(0.0, 0.0, 0.0)),
     mca.Prescribed: mca.Prescribed(body="low", nodes="ymin", axis="x", times=(0.0, 1.0), velocities=(0.0, 1.0)),
@@ -183,7 +189,15 @@ def scene_with(item: Any) -> mca.Scene:
             change = {"bodies": (dataclasses.replace(low, material=item, **own), up)}
         case mca.Part():
             change = {"bodies": (dataclasses.replace(low, geometry=mca.Parts(parts=(item,))), up)}
-        case mca.Box() | mca.Rod() | mca.Sphere() | mca.Plate() | mca.NestedPlate() | mca.Parts():
+        case (
+            geometry.InertiaBrick()
+            | mca.Box()
+            | mca.Rod()
+            | mca.Sphere()
+            | mca.Plate()
+            | mca.NestedPlate()
+            | mca.Parts()
+        ):
             change = {"bodies": (dataclasses.replace(low, geometry=item), up)}
         case mca.Select():
             return scene_with(dataclasses.replace(SOUND[mca.MeshFile], select=(item,)))
@@ -195,6 +209,12 @@ def scene_with(item: Any) -> mca.Scene:
             change = {"loads": (dataclasses.replace(SOUND[mca.Pressure], amplitude=item),)}
         case Load():
             change = {"loads": (item,)}
+        case mca.Freedom():
+            return scene_with(mca.Articulation(name="A", body="low", freedoms=(item,)))
+        case mca.PositionServo():
+            return scene_with(mca.Freedom(motor=item))
+        case Joint() if item.whole() is not None:
+            change = {"joints": (item,), "bodies": (dataclasses.replace(low, rigid=True), up)}
         case Joint():
             change = {"joints": (item,)}
         case mca.Penalty() | mca.DampedPenalty():

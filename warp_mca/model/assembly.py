@@ -25,6 +25,7 @@ from warp_mca.physics.elements.cells import (
     body_materials,
     densities,
     element_masses,
+    own_masses,
     point_masses,
     sum_to_nodes,
 )
@@ -88,6 +89,9 @@ class Assembly:
             self.face_depth[part.index], self.face_height[part.index] = kind.face_depth, kind.face_height
             self.element_mass.append(mass)
             self.mass += sum_to_nodes(part.conn, mass, nodes)
+        for body in (body for body in scene.bodies if body.mass is not None):
+            own = self.all_nodes(body.name)
+            self.mass[own] = own_masses(body, meshes[body.name], self.mass[own])
         for name in {item.body for item in scene.masses}:
             own = self.all_nodes(name)
             self.mass[own] += point_masses(scene, meshes[name], name, self.mass[own])

@@ -14,6 +14,7 @@ from warp_mca.geometry.refinement import refined
 from warp_mca.geometry.shape_volume import built
 from warp_mca.phases.arguments import check_scene
 from warp_mca.physics.elements import ELEMENTS, default_element
+from warp_mca.physics.elements.cells import with_carriers
 from warp_mca.scene import Body, Scene
 
 
@@ -54,6 +55,7 @@ def mesh(
     for name, item in cut.items():
         if item is not meshes[name]:  # a hexahedron with a folded corner may give an inverted tetrahedron
             check(item, name)
+    cut = {body.name: with_carriers(body, cut[body.name]) for body in scene.bodies}
     for field, body, name, covers in scene.named_sets():
         _check_set(field, body, name, cut[body], covers)
     return cut

@@ -6,12 +6,14 @@ and the remedy. Nothing here meshes, allocates or imports Warp.
 
 from warp_mca.scene.absorbing import Absorbing
 from warp_mca.scene.amplitude import Amplitude
+from warp_mca.scene.articulations import Articulation, Cylindrical, Universal
 from warp_mca.scene.bodies import Body, Vec3
 from warp_mca.scene.bonds import Bond
 from warp_mca.scene.contact_laws import DampedPenalty, Penalty
 from warp_mca.scene.contacts import OVERLAP_CHOICES, Contact, ContactAll, RigidPlane, Surface
 from warp_mca.scene.damping import Damping
 from warp_mca.scene.drives import Fixed, Prescribed
+from warp_mca.scene.freedoms import Freedom, PositionServo
 from warp_mca.scene.friction_laws import DecayingFriction, ShearCap
 from warp_mca.scene.joints import Prismatic, Revolute, Spherical, Weld
 from warp_mca.scene.loads import BodyForce, Force, Pressure, ThermalStrain, Traction
@@ -27,17 +29,20 @@ __all__ = [
     "OVERLAP_CHOICES",
     "Absorbing",
     "Amplitude",
+    "Articulation",
     "BaseMotion",
     "Body",
     "BodyForce",
     "Bond",
     "Contact",
     "ContactAll",
+    "Cylindrical",
     "DampedPenalty",
     "Damping",
     "DecayingFriction",
     "Fixed",
     "Force",
+    "Freedom",
     "ImpactPhase",
     "JointTorque",
     "Line",
@@ -45,6 +50,7 @@ __all__ = [
     "Penalty",
     "Point",
     "PointMass",
+    "PositionServo",
     "Prescribed",
     "Pressure",
     "Prismatic",
@@ -64,6 +70,7 @@ __all__ = [
     "Tie",
     "Tip",
     "Traction",
+    "Universal",
     "Vec3",
     "Weld",
 ]

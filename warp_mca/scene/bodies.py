@@ -12,6 +12,8 @@ import numpy as np
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.base.rotation import rotation_matrix
+from warp_mca.geometry.mass_properties import HEAVIEST, LIGHTEST, Matrix, inertia_matrix
+from warp_mca.scene.elastic import Elastic
 from warp_mca.scene.elements import ELEMENTS
 from warp_mca.scene.materials import MATERIALS, Material, check_law
 
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from warp_mca.scene.contacts import RigidPlane
 
 Vec3 = tuple[float, float, float]
+STEEL = Elastic(E=2.1e11, nu=0.3, rho=7800.0)  # of rigid bodies whose material is not given
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,8 +32,11 @@ class Body:
 
     Attributes:
         name: unique in the scene.
-        geometry: a recipe that makes the mesh when it is needed, or a finished mesh, in the body's own frame.
-        material: one material, or one for each cell set of the mesh; the key "*" stands for the other cells.
+        geometry: a recipe that makes the mesh when it is needed, or a finished mesh, in the body's own frame. A rigid
+            body with a mass of its own may go without: it is then drawn as the brick of its inertia, and touches
+            nothing.
+        material: one material, or one for each cell set of the mesh; the key "*" stands for the other cells. A rigid
+            body with a mass of its own may go without: contact springs then take it as stiff as steel.
         element: formulation of its hexahedra, wedges and pyramids: "hex8i" bends right with one cell over a wall;
             "hex8", the paper's, does not; "hex8r", the cheapest, has one point and hourglass stiffness. For walls of
             one cell that yield, "hex8w" has two points in each half of the thickness, "hex8w3" three. "tet4", "tet10"
@@ -48,6 +54,10 @@ class Body:
         rigid: whether it moves as a rigid body in the impact phase: its elements are not computed, and `material` gives
             its mass and the stiffness of contact springs alone. Its inertia is that of its nodes: for a brick of n
             cells along each edge 2 / n^2 above that of its volume.
+        mass: of a rigid body, in place of that of its mesh [kg]; with it `inertia` is given.
+        centre: of this mass in the body's frame [m].
+        inertia: of this mass about the centre, along the axes of the body's frame [kg m^2]: three rows of a 3 x 3
+            matrix, or three principal values.
         exact_mass: whether masses of nodes are scaled to the volume of the shape that the recipe or CAD file describes,
             where the mesh knows it (`Mesh.volume_ratio`): flat cells fill a round body less than fully. Momentum,
             impulse, weight and moments of inertia then scale alike; waves are slower by half of the share. False: the
@@ -55,8 +65,8 @@ class Body:
     """
 
     name: str
-    geometry: Recipe | Mesh
-    material: Material | Mapping[str, Material]
+    geometry: Recipe | Mesh = None  # pyright: ignore[reportAssignmentType]  # a body with a mass gets its brick
+    material: Material | Mapping[str, Material] = None  # pyright: ignore[reportAssignmentType]  # likewise, STEEL
     element: str = "hex8i"
     kinematics: Literal["corotational", "finite"] = "corotational"
     position: Vec3 = (0.0, 0.0, 0.0)
@@ -66,12 +76,20 @@ class Body:
     rigid: bool = False
     exact_mass: bool = True
     across: Vec3 | None = None
+    mass: float | None = None
+    centre: Vec3 = (0.0, 0.0, 0.0)
+    inertia: Vec3 | Matrix | None = None
 
     def __post_init__(self) -> None:
         validate.plain(self)
         validate.texts("Body", name=self.name)
+        self._check_mass()
         if isinstance(self.geometry, type) or not (hasattr(self.geometry, "build") or hasattr(self.geometry, "points")):
-            raise bad_value(f"Body {self.name}.geometry", self.geometry, "give a recipe, as Box(...), or a Mesh")
+            raise bad_value(
+                f"Body {self.name}.geometry",
+                self.geometry,
+                "give a recipe, as Box(...), a Mesh, or the mass of a rigid body",
+            )
         materials = self.material.values() if isinstance(self.material, Mapping) else (self.material,)
         if not all(type(material) in MATERIALS.values() for material in materials):  # others have no kernels
             known = " or ".join(f"{'an' if name[0] in 'AEIOU' else 'a'} {name}" for name in MATERIALS)
@@ -95,6 +113,33 @@ class Body:
             velocity=self.velocity,
             angular_velocity=self.angular_velocity,
         )
+
+    def _check_mass(self) -> None:
+        """Check mass, centre and inertia, and let them stand for geometry and material where these are left out."""
+        owner = f"Body {self.name}"
+        if self.mass is None:
+            for name, plain in (("inertia", None), ("centre", (0.0, 0.0, 0.0))):
+                if getattr(self, name) != plain:
+                    raise bad_value(f"{owner}.{name}", getattr(self, name), "it belongs to a mass; give that, too")
+            return
+        if self.rigid is not True:
+            raise bad_value(f"{owner}.mass", self.mass, "a flexible body has that of its mesh; set rigid=True")
+        validate.within(owner, LIGHTEST, HEAVIEST, mass=self.mass)
+        validate.vectors(owner, centre=self.centre)
+        inertia = inertia_matrix(owner, self.inertia)
+        object.__setattr__(self, "inertia", inertia)
+        from warp_mca.geometry.inertia_brick import InertiaBrick
+
+        if self.geometry is None or isinstance(self.geometry, InertiaBrick):
+            brick = InertiaBrick(mass=self.mass, centre=self.centre, inertia=inertia)
+            object.__setattr__(self, "geometry", brick)
+        if self.material is None:
+            object.__setattr__(self, "material", STEEL)
+
+    @property
+    def is_inertia(self) -> bool:
+        """Whether it is a mass with an inertia, without geometry."""
+        return self.mass is not None and type(self.geometry).__name__ == "InertiaBrick"
 
     @property
     def fails(self) -> bool:

@@ -6,7 +6,6 @@ new kind is a dataclass made of `Joint` with a place in the table `JOINTS`; the 
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from types import NoneType
 from typing import ClassVar, Literal
@@ -16,11 +15,12 @@ import numpy as np
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.scene.bodies import Vec3
+from warp_mca.scene.freedoms import Freedom, Whole
 from warp_mca.scene.ties import Clusters, Index, Pin, Rails, Side, Ties, coincident, rails_along
 
 
 @dataclass(frozen=True, kw_only=True)
-class Joint(ABC):
+class Joint:
     """Base class of joints.
 
     Attributes:
@@ -47,13 +47,21 @@ class Joint(ABC):
         """Kind and name, for errors."""
         return f"{type(self).__name__} {self.name}"
 
-    @abstractmethod
     def ties(self, first: Side, second: Side | None) -> Ties | Rails | Clusters:
         """Pairs that the joint ties, nodes on rails, or clusters; `second` is None for the ground.
 
         Raises:
             RequestError: the bodies have no such nodes.
         """
+        raise NotImplementedError("its class has no ties()")
+
+    def whole(self) -> Whole | None:
+        """Its freedoms where it joins whole bodies, one of them rigid, in place of nodes; None where it ties nodes."""
+        return None
+
+    def sets(self) -> dict[str, tuple[str, str]]:
+        """Node sets that it names, by field: the body and the set."""
+        return {}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,14 +82,15 @@ class Revolute(Joint):
     at: Vec3
     other_at: Vec3 = (0.0, 0.0, 0.0)
     axis: Vec3 = (0.0, 0.0, 1.0)
-    nodes: Literal["axis", "ends", "pin", "hole"] = "axis"
+    nodes: Literal["axis", "ends", "pin", "hole"] | None = "axis"
     pin_radius: float | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
         validate.vectors(self.title, at=self.at, other_at=self.other_at)
         validate.directions(self.title, axis=self.axis)
-        validate.choice(self.title, ("axis", "ends", "pin", "hole"), nodes=self.nodes)
+        if self.nodes is not None:
+            validate.choice(self.title, ("axis", "ends", "pin", "hole"), nodes=self.nodes)
         pinned = self.nodes in ("pin", "hole")
         if (self.pin_radius is not None) != pinned:
             remedy = f"give the radius of the {self.nodes} [m]" if pinned else 'it needs nodes="pin"; leave it out'
@@ -94,6 +103,12 @@ class Revolute(Joint):
         """Which nodes around the axis share a mean motion; None where those on it are tied."""
         return None if self.pin_radius is None else Pin(self.pin_radius, hole=self.nodes == "hole")
 
+    def whole(self) -> Whole | None:
+        """A hinge, without nodes."""
+        if self.nodes is not None:
+            return None
+        return Whole((Freedom(axis=self.axis),), self.at, self.other_at if self.other else None)
+
     def ties(self, first: Side, second: Side | None) -> Ties | Clusters:
         """Nodes on the axis, in the order along it, or those around it."""
         if self.pin is not None:
@@ -102,7 +117,7 @@ class Revolute(Joint):
             return Clusters(*a, self.at, self.axis, *b, self.other_at)
         a = self._nodes(first, self.at)
         if len(a) < 2:
-            what = f"{len(a)} nodes of {self.body} lie on this axis; two are needed"
+            what = f"{len(a)} nodes of {self.body} lie on this axis; two are needed, or nodes=None for rigid bodies"
             raise bad_value(f"{self.title}.at", self.at, what)
         return Ties(a, None if second is None else self._nodes(second, self.other_at))
 
@@ -116,20 +131,28 @@ class Weld(Joint):
     """All coincident nodes of two node sets move as one, or those of one set stay at rest.
 
     Attributes:
-        nodes: node set of `body`.
+        nodes: node set of `body`; None joins rigid bodies as a whole, in the place where they stand.
         other_nodes: node set of `other`; None for the ground. Nodes without a partner there stay free.
     """
 
-    nodes: str
+    nodes: str | None = None
     other_nodes: str | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        validate.texts(self.title, nodes=self.nodes)
-        _check_sets(self, self.other_nodes)
+        _check_sets(self, self.nodes, self.other_nodes)
+
+    def whole(self) -> Whole | None:
+        """No freedom, without nodes."""
+        return Whole() if self.nodes is None else None
+
+    def sets(self) -> dict[str, tuple[str, str]]:
+        """Those of both bodies."""
+        return _sets(self, self.nodes, self.other_nodes)
 
     def ties(self, first: Side, second: Side | None) -> Ties:
         """Each node of the set, with the one of the other set at its place."""
+        assert self.nodes is not None
         a, b = first.mesh.nodes(self.nodes), None
         if second is not None:
             assert self.other_nodes is not None
@@ -148,15 +171,25 @@ class Spherical(Joint):
     Attributes:
         at: place of the node in the frame of `body` [m].
         other_at: place of the other node in the frame of `other` [m].
+        nodes: "nearest" ties the nodes there; None needs no nodes: rigid bodies hang together as a whole.
     """
 
     at: Vec3
     other_at: Vec3 = (0.0, 0.0, 0.0)
+    nodes: Literal["nearest"] | None = "nearest"
     place = "at"
 
     def __post_init__(self) -> None:
         super().__post_init__()
         validate.vectors(self.title, at=self.at, other_at=self.other_at)
+        if self.nodes not in ("nearest", None):
+            raise bad_value(f"{self.title}.nodes", self.nodes, 'give "nearest", or None for rigid bodies without nodes')
+
+    def whole(self) -> Whole | None:
+        """A ball, without nodes."""
+        if self.nodes is not None:
+            return None
+        return Whole((Freedom(kind="ball"),), self.at, self.other_at if self.other else None)
 
     def ties(self, first: Side, second: Side | None) -> Ties:
         """The node at the joint, of each body."""
@@ -167,8 +200,8 @@ class Spherical(Joint):
         away = np.linalg.norm(side.mesh.points - np.asarray(at), axis=1)
         nearest = int(np.argmin(away))
         if away[nearest] > side.tolerance:
-            what = f"the nearest node of {side.body} is {away[nearest]:.3g} m away; give the place of a node"
-            raise bad_value(f"{self.title}.{field}", at, what)
+            what = f"the nearest node of {side.body} is {away[nearest]:.3g} m away"
+            raise bad_value(f"{self.title}.{field}", at, f"{what}; give the place of a node, or nodes=None")
         return np.array([nearest], dtype=np.int32)
 
 
@@ -180,23 +213,32 @@ class Prismatic(Joint):
     the node is on; rails bend and turn with the body that they belong to, and go on straight beyond their ends.
 
     Attributes:
-        nodes: node set of `body`; relative to another body, those that are on none of its lines stay free.
+        nodes: node set of `body`; relative to another body, those that are on none of its lines stay free. None lets
+            rigid bodies slide as a whole, along a direction that turns with them.
         other_nodes: node set of `other` that holds the rails; None for the ground.
         axis: direction of the slide in the frame of `body` at the start [-].
     """
 
-    nodes: str
     axis: Vec3
+    nodes: str | None = None
     other_nodes: str | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        validate.texts(self.title, nodes=self.nodes)
         validate.directions(self.title, axis=self.axis)
-        _check_sets(self, self.other_nodes)
+        _check_sets(self, self.nodes, self.other_nodes)
+
+    def whole(self) -> Whole | None:
+        """A slide, without nodes."""
+        return Whole((Freedom(kind="slide", axis=self.axis),)) if self.nodes is None else None
+
+    def sets(self) -> dict[str, tuple[str, str]]:
+        """Those of both bodies."""
+        return _sets(self, self.nodes, self.other_nodes)
 
     def ties(self, first: Side, second: Side | None) -> Ties | Rails:
         """The nodes of the set, across the axis."""
+        assert self.nodes is not None
         a, axis = first.mesh.nodes(self.nodes), first.frame @ np.asarray(self.axis) / np.linalg.norm(self.axis)
         if second is None:
             return Ties(a, tied=np.eye(3) - np.outer(axis, axis))
@@ -210,10 +252,26 @@ class Prismatic(Joint):
         return rails
 
 
-def _check_sets(joint: Joint, other_nodes: str | None) -> None:
-    if (other_nodes is None) != (joint.other is None):
+def _check_sets(joint: Joint, nodes: str | None, other_nodes: str | None) -> None:
+    """Refuse one node set where both bodies have one, or none.
+
+    Raises:
+        RequestError: so it is.
+    """
+    if nodes is not None:
+        validate.texts(joint.title, nodes=nodes)
+    if (other_nodes is None) != (joint.other is None or nodes is None):
         remedy = "name a node set of the other body" if joint.other else "leave it out, the ground has no nodes"
+        remedy = "give nodes too, or leave both out for rigid bodies" if joint.other and nodes is None else remedy
         raise bad_value(f"{joint.title}.other_nodes", other_nodes, remedy)
+
+
+def _sets(joint: Joint, nodes: str | None, other_nodes: str | None) -> dict[str, tuple[str, str]]:
+    """As `Joint.sets`."""
+    found = {} if nodes is None else {"nodes": (joint.body, nodes)}
+    if joint.other is not None and other_nodes is not None:
+        found["other_nodes"] = (joint.other, other_nodes)
+    return found
 
 
 def _on_a_line(side: Side, nodes: Index) -> bool:

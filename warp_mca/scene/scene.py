@@ -10,11 +10,12 @@ from types import NoneType
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.scene.absorbing import Absorbing
+from warp_mca.scene.articulations import check_whole
 from warp_mca.scene.bodies import Body, Vec3
 from warp_mca.scene.contacts import Contact, ContactAll, RigidPlane, Surface
 from warp_mca.scene.drives import Fixed, Prescribed
 from warp_mca.scene.failure import check_contacts
-from warp_mca.scene.joints import JOINTS, Joint, Prismatic, Weld
+from warp_mca.scene.joints import JOINTS, Joint
 from warp_mca.scene.loads import LOADS, Load
 from warp_mca.scene.masses import PointMass
 from warp_mca.scene.phases import PHASES, ImpactPhase, RigidPhase
@@ -138,6 +139,7 @@ class Scene:
         for field_name, body in self._named_bodies():
             if body not in names:
                 raise bad_value(field_name, body, f"the scene's bodies are {', '.join(names)}")
+        check_whole(self)
         if self.general and not self.general_pairs():
             remedy = "no pair is left to it: bodies are listed, bound to each other, excluded or rigid; leave it out"
             raise bad_value("Scene.contacts", "ContactAll", remedy)
@@ -237,10 +239,7 @@ class Scene:
         ]
         named += [(f"{type(load).__name__}.{key}", *own) for load in self.loads for key, own in load.sets().items()]
         for joint in self.joints:
-            if isinstance(joint, Weld | Prismatic):
-                named.append((f"{joint.title}.nodes", joint.body, joint.nodes, False))
-                if joint.other is not None and joint.other_nodes is not None:
-                    named.append((f"{joint.title}.other_nodes", joint.other, joint.other_nodes, False))
+            named += [(f"{joint.title}.{key}", *own, False) for key, own in joint.sets().items()]
         named += [(f"{field}.nodes", surface.body, surface.nodes, True) for field, surface in self._surfaces()]
         points = (*self.probes, *self.masses)
         return named + [(f"{p.title}.nodes", p.body, p.nodes, False) for p in points if p.nodes is not None]
@@ -258,7 +257,7 @@ class Scene:
     def general_pairs(self) -> list[tuple[str, str]]:
         """Pairs of bodies that the general contact keeps apart, bodies with themselves too, each pair once.
 
-        Not those that are excluded, listed, bound by a joint or a tie, or both rigid.
+        Not those that are excluded, listed, bound by a joint or a tie, both rigid, or one without geometry.
         """
         if self.general is None:
             return []
@@ -268,6 +267,7 @@ class Scene:
         out |= {frozenset((joint.body, joint.other)) for joint in self.joints if joint.other is not None}
         out |= {frozenset((tie.slave.body, tie.master.body)) for tie in self.ties}
         out |= {frozenset(pair) for pair in combinations_with_replacement(self.rigid_names, 2)}
+        out |= {frozenset((a.name, b.name)) for a in self.bodies if a.is_inertia for b in self.bodies}
         if not self.general.self_contact:
             out |= {frozenset((body.name,)) for body in self.bodies}
         pairs = combinations_with_replacement([body.name for body in self.bodies], 2)

@@ -70,7 +70,7 @@ def raised_inertia(c: Finished, most: float) -> Iterator[Values]:
         return
     model, absorbing = c.model, {item.body for item in c.scene.absorbing}
     for body in c.scene.bodies:
-        if body.name in absorbing:
+        if body.name in absorbing or body.mass is not None:
             continue
         mesh, own = c.meshes[body.name], c.nodes(body.name)
         mass = model.mass[own]

@@ -16,6 +16,7 @@ from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.point_location import around_point, weighted_set
 from warp_mca.geometry.shape_volume import of_cells
 from warp_mca.physics.elements import ELEMENTS, Element, default_element
+from warp_mca.physics.elements.given_mass import given_masses, mesh_with_carriers
 from warp_mca.physics.ties.nodes import within_body
 from warp_mca.scene import Body, Scene
 from warp_mca.scene.materials import Material
@@ -134,8 +135,28 @@ def nodal_masses(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, Array]:
         total = np.zeros(len(points))
         for part in body_cells(body, mesh):
             total += sum_to_nodes(part.conn, element_masses(part, points, rho), len(total))
+        total = own_masses(body, mesh, total)
         masses[body.name] = ties.carried(total + point_masses(scene, mesh, body.name, total))
     return masses
+
+
+def _volumes(body: Body, mesh: Mesh) -> Array:
+    """Volume that each node of a mesh stands for [m^3], shape (node_count,), float64."""
+    total = np.zeros(len(mesh.points))
+    for part in body_cells(body, mesh):
+        volume = element_masses(part, mesh.points, np.ones(mesh.cell_count))
+        total += sum_to_nodes(part.conn, volume, len(total))
+    return total
+
+
+def own_masses(body: Body, mesh: Mesh, mass: Array) -> Array:
+    """Masses of the nodes of a body [kg], shape (node_count,), float64: `mass` of its cells, unless it has its own."""
+    return mass if body.mass is None else given_masses(body, mesh, _volumes(body, mesh))
+
+
+def with_carriers(body: Body, mesh: Mesh) -> Mesh:
+    """The mesh of a body, with nodes that carry its own mass where it has one, see `given_mass`."""
+    return mesh if body.mass is None else mesh_with_carriers(body, mesh, _volumes(body, mesh))
 
 
 def point_masses(scene: Scene, mesh: Mesh, body: str, mass: Array) -> Array:
