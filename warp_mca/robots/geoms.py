@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +11,7 @@ import numpy as np
 
 from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
+from warp_mca.geometry.mesh import Mesh
 from warp_mca.robots.skins import Skin
 
 if TYPE_CHECKING:
@@ -16,6 +19,8 @@ if TYPE_CHECKING:
     from warp_mca.robots.touching import Side
 
 AROUND = 48  # faces around a round geom, which then lies at most 0.2 % of its radius inside
+ON_RIM = 1e-6  # share of a radius within which a point lies on the rim of a cylinder
+MOST_RINGS = 64  # of nodes along the side of a capsule, which are half a radius apart
 _BOX = np.array([list(map(int, face)) for face in "032 021 456 467 015 054 126 165 237 276 304 347".split()], np.int32)
 _CORNERS = np.array(
     [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]], dtype=float
@@ -29,8 +34,10 @@ def geom_side(mj: Any, machine: Machine, side: Side) -> Side:
     return replace(side, skin=Skin(points, faces))
 
 
-def geom_surface(mj: Any, machine: Machine, geom: int, name: str) -> tuple[Array, Index]:
+def geom_surface(mj: Any, machine: Machine, geom: int, name: str, around: int = AROUND) -> tuple[Array, Index]:
     """Nodes [m], shape (count, 3), and triangles of the surface of a geom, in the geom's frame.
+
+    A round one has `around` faces around its axis.
 
     Raises:
         RequestError: the kind of the geom has none.
@@ -51,32 +58,88 @@ def geom_surface(mj: Any, machine: Machine, geom: int, name: str) -> tuple[Array
         remedy = "its kind has no closed surface for a flexible body or a mesh to touch; take a box or a mesh"
         raise bad_value("Robot: geom", name, remedy)
     if known[kind] == "CYLINDER":
-        return _turned(np.array([[0.0, -b], [a, -b], [a, b], [0.0, b]]))
-    angle = np.linspace(-0.5 * np.pi, 0.5 * np.pi, AROUND // 2 + 1)
+        return _turned(np.array([[0.0, -b], [a, -b], [a, b], [0.0, b]]), around)
+    angle = np.linspace(-0.5 * np.pi, 0.5 * np.pi, around // 2 + 1)
     outline = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     if known[kind] == "CAPSULE":
-        low, high = outline[: AROUND // 4 + 1], outline[AROUND // 4 :]
-        return _turned(np.concatenate([a * low - (0.0, b), a * high + (0.0, b)]))
-    points, faces = _turned(outline)
+        low, high = a * outline[: around // 4 + 1] - (0.0, b), a * outline[around // 4 :] + (0.0, b)
+        rings = np.linspace(-b, b, 1 + min(max(math.ceil(4.0 * b / a), 1), MOST_RINGS))[1:-1]
+        side = np.stack([np.full(len(rings), a), rings], axis=1)
+        return _turned(np.concatenate([low, side, high]), around)
+    points, faces = _turned(outline, around)
     return points * ((a, a, a) if known[kind] == "SPHERE" else (a, b, c)), faces
 
 
-def _turned(outline: Array) -> tuple[Array, Index]:
+def _turned(outline: Array, around: int) -> tuple[Array, Index]:
     """The surface that an outline (radius, z), from the lower pole to the upper one, makes when it turns about z."""
-    angle = 2.0 * np.pi * np.arange(AROUND) / AROUND
+    angle = 2.0 * np.pi * np.arange(around) / around
     ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     inner = outline[1:-1]
-    sides = np.concatenate([np.concatenate([r * ring, np.full((AROUND, 1), z)], axis=1) for r, z in inner])
+    sides = np.concatenate([np.concatenate([r * ring, np.full((around, 1), z)], axis=1) for r, z in inner])
     points = np.concatenate([sides, [[0.0, 0.0, outline[0, 1]], [0.0, 0.0, outline[-1, 1]]]])
-    k = np.arange(AROUND)
-    nxt, faces = (k + 1) % AROUND, []
+    k = np.arange(around)
+    nxt, faces = (k + 1) % around, []
     for row in range(len(inner) - 1):
-        low, high = row * AROUND, (row + 1) * AROUND
+        low, high = row * around, (row + 1) * around
         faces += [np.stack([low + k, low + nxt, high + nxt], axis=1), np.stack([low + k, high + nxt, high + k], axis=1)]
-    last, bottom = (len(inner) - 1) * AROUND, len(sides)
-    faces += [np.stack([np.full(AROUND, bottom), nxt, k], axis=1)]
-    faces += [np.stack([last + k, last + nxt, np.full(AROUND, bottom + 1)], axis=1)]
+    last, bottom = (len(inner) - 1) * around, len(sides)
+    faces += [np.stack([np.full(around, bottom), nxt, k], axis=1)]
+    faces += [np.stack([last + k, last + nxt, np.full(around, bottom + 1)], axis=1)]
     return points, np.concatenate(faces).astype(np.int32)
+
+
+def with_node(mj: Any, machine: Machine, geom: int, points: Array, point: Array) -> Array:
+    """The nodes of a round geom with the nearest one moved to a point of its surface where it touches [m].
+
+    Those of boxes and meshes stay: they touch with a corner, or are touched on a face.
+    """
+    kinds = [int(getattr(mj.mjtGeom, f"mjGEOM_{key}")) for key in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER")]
+    kind, radius = int(machine.model.geom_type[geom]), float(machine.model.geom_size[geom, 0])
+    rim = math.hypot(point[0], point[1]) > (1.0 - ON_RIM) * radius
+    if kind not in kinds or (kind == kinds[3] and not rim):
+        return points
+    moved = points.copy()
+    moved[np.linalg.norm(points - point, axis=1).argmin()] = point
+    return moved
+
+
+def filled(name: str, surface: tuple[Array, Index], node_set: str) -> Mesh:
+    """A mesh of tetrahedra from the middle of a closed surface to its triangles; `node_set` names its nodes.
+
+    Raises:
+        RequestError: a triangle does not face away from the middle.
+    """
+    points, faces = surface
+    middle = points[np.unique(faces)].mean(axis=0)
+    a, b, c = (points[faces[:, k]] - middle for k in range(3))
+    if (np.einsum("ij,ij->i", a, np.cross(b, c)) <= 0.0).any():
+        remedy = "its surface does not face away from its middle everywhere; cut it into parts that do"
+        raise bad_value("Robot: geom", name, remedy)
+    corners = np.concatenate([np.full((len(faces), 1), len(points)), faces], axis=1).astype(np.int32)
+    nodes = np.arange(len(points), dtype=np.int32)
+    return Mesh(
+        points=np.vstack([points, middle]),
+        hexahedra=np.zeros((0, 8), np.int32),
+        tetrahedra=corners,
+        node_sets={node_set: nodes},
+    )
+
+
+def joined(meshes: Sequence[Mesh]) -> Mesh:
+    """Several meshes of tetrahedra as one, with all their node sets."""
+    start = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])[:-1]
+    return Mesh(
+        points=np.concatenate([mesh.points for mesh in meshes]),
+        hexahedra=np.zeros((0, 8), np.int32),
+        tetrahedra=np.concatenate([mesh.tetrahedra + k for mesh, k in zip(meshes, start, strict=True)]).astype(
+            np.int32
+        ),
+        node_sets={
+            name: (nodes + k).astype(np.int32)
+            for mesh, k in zip(meshes, start, strict=True)
+            for name, nodes in mesh.node_sets.items()
+        },
+    )
 
 
 def merged(points: Array, faces: Index) -> tuple[Array, Index]:

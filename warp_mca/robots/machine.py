@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
-from warp_mca.robots.reading import Names, compiled, filled, mujoco
+from warp_mca.base.rotation import rotation_matrix
+from warp_mca.robots.masses import MassProperties, of_link, rest_of
+from warp_mca.robots.reading import Names, compiled, filled, mujoco, with_masses
 
 if TYPE_CHECKING:
     from warp_mca.robots.robot import Robot
@@ -20,16 +23,41 @@ CLOSED = 1e-8  # gap of a loop at the start [m, rad]
 NUDGE = 1e-6  # time for the difference that gives J' v [s]
 
 
+class Motion(NamedTuple):
+    """Pose and motion of a link.
+
+    Attributes:
+        origin: of its frame [m], shape (3,), float64.
+        rotation: from its frame to the world [-], shape (3, 3), float64.
+        velocity: of the origin [m/s], shape (3,), float64.
+        spin: angular velocity [rad/s], shape (3,), float64.
+    """
+
+    origin: Array
+    rotation: Array
+    velocity: Array
+    spin: Array
+
+    def turn(self, rotation: Sequence[float] = (0.0, 0.0, 0.0)) -> Array:
+        """Rotation vector of a frame that is turned by `rotation` in that of the link [rad], shape (3,), float64."""
+        from scipy.spatial.transform import Rotation
+
+        return Rotation.from_matrix(self.rotation @ rotation_matrix(rotation)).as_rotvec()
+
+
 class Machine:
     """A robot's model, its data at the latest time asked for, and forces that MuJoCo does not compute here.
 
     y holds coordinates and rates, then the work of drives and of all other forces but gravity and springs [J].
 
     Attributes:
+        mj: the module `mujoco`.
         model, data: of MuJoCo.
         names: of what the model holds.
+        rests: what flexible links have beyond their meshes, by name.
         ctrl: controls that are held, shape (nu,), float64.
         limited: index of the rate of each joint with a limit, int.
+        passive: whether the file switches all drives off.
         limit_stiffness: of these limits [N m/rad, N/m], float64.
         limit_damping: of these limits [N m s/rad, N s/m], float64.
     """
@@ -40,13 +68,16 @@ class Machine:
         Raises:
             RequestError: the file, or the start, is not one of a machine.
         """
-        self._mj: Any = mujoco("Robot.file", robot.path)
-        self.model: Any = compiled(robot)
-        self.data: Any = self._mj.MjData(self.model)
-        self._beside: Any = self._mj.MjData(self.model)
-        self.names = Names(self._mj, self.model)
+        self.mj: Any = mujoco("Robot.file", robot.path)
+        self.model: Any
+        spec, self.model = compiled(robot)
+        self.names = Names(self.mj, self.model)
+        self.rests = self._rests(robot, spec)
+        self.data: Any = self.mj.MjData(self.model)
+        self._beside: Any = self.mj.MjData(self.model)
         self.nq, self.nv = int(self.model.nq), int(self.model.nv)
-        scalar = self.model.jnt_type >= int(self._mj.mjtJoint.mjJNT_SLIDE)
+        self.passive = bool(int(self.model.opt.disableflags) & int(self.mj.mjtDisableBit.mjDSBL_ACTUATION))
+        scalar = self.model.jnt_type >= int(self.mj.mjtJoint.mjJNT_SLIDE)
         joints = np.flatnonzero(self.model.jnt_limited.astype(bool) & scalar)
         self._range, self.limited = self.model.jnt_range[joints], self.model.jnt_dofadr[joints]
         self._limited_q, self._friction = self.model.jnt_qposadr[joints], self.model.dof_frictionloss.copy()
@@ -57,17 +88,30 @@ class Machine:
         self.limit_stiffness = inertia * LIMIT_RATE**2
         self.limit_damping = 2.0 * inertia * LIMIT_RATE
 
+    def _rests(self, robot: Robot, spec: Any) -> dict[str, MassProperties]:
+        """What flexible links have beyond their meshes; those that have nothing take the mass of the mesh.
+
+        Raises:
+            RequestError: a name is not known, or a mesh has more than its link.
+        """
+        for name in robot.flexible:
+            if name not in self.names.bodies:
+                raise bad_value("Robot.flexible", name, f"the file's links are {', '.join(self.names.bodies)}")
+        own = {name: of_link(self, 1 + self.names.bodies.index(name)) for name in robot.flexible}
+        found = {name: rest_of(name, file, robot.mesh_masses[name]) for name, file in own.items()}
+        if alike := {name: robot.mesh_masses[name] for name, rest in found.items() if rest is None}:
+            self.model = with_masses(self.mj, robot, spec, alike)
+        return {name: rest for name, rest in found.items() if rest is not None}
+
     def _start(self, robot: Robot) -> Array:
         """Coordinates and rates at the start, shape (nq + nv,), float64; sets the controls too."""
         model, data, names = self.model, self.data, self.names
-        self._mj.mj_resetData(model, data)
+        self.mj.mj_resetData(model, data)
         if robot.keyframe is not None:
-            keys = [self._mj.mj_id2name(model, int(self._mj.mjtObj.mjOBJ_KEY), k) for k in range(model.nkey)]
+            keys = self.keyframes
             if robot.keyframe not in keys:
-                raise bad_value(
-                    "Robot.keyframe", robot.keyframe, f"the file's are {', '.join(filter(None, keys)) or 'none'}"
-                )
-            self._mj.mj_resetDataKeyframe(model, data, keys.index(robot.keyframe))
+                raise bad_value("Robot.keyframe", robot.keyframe, f"the file's are {', '.join(keys) or 'none'}")
+            self.mj.mj_resetDataKeyframe(model, data, keys.index(robot.keyframe))
         ends = {"q": [*model.jnt_qposadr, self.nq], "v": [*model.jnt_dofadr, self.nv]}
         place = lambda key: lambda k: slice(int(ends[key][k]), int(ends[key][k + 1]))  # noqa: E731
         q = filled("Robot.qpos", robot.qpos, np.array(data.qpos), names.joints, place("q"), "joint")
@@ -79,9 +123,21 @@ class Machine:
         self.ctrl = filled("Robot.ctrl", robot.ctrl, ctrl, names.actuators, one, "actuator")
         y = np.concatenate([q, v])
         self._set(self.data, y)
-        self._mj.mj_fwdPosition(model, data)
+        self.mj.mj_fwdPosition(model, data)
         self._check_loops()
         return y
+
+    @property
+    def keyframes(self) -> list[str]:
+        """Names of the file's keyframes; empty texts where it gives none."""
+        kind = int(self.mj.mjtObj.mjOBJ_KEY)
+        return [self.mj.mj_id2name(self.model, kind, k) or "" for k in range(self.model.nkey)]
+
+    @property
+    def meets_the_world(self) -> bool:
+        """Whether the file has a geom of the world that something may touch."""
+        fixed = self.model.body_weldid[self.model.geom_bodyid] == 0
+        return bool((self.model.geom_contype | self.model.geom_conaffinity)[fixed].any())
 
     def _check_limits(self, joints: Array) -> None:
         for k, joint in enumerate(joints):
@@ -95,7 +151,7 @@ class Machine:
         """Refuse a start that opens loops."""
         if not self.data.nefc:
             return
-        self._mj.mj_fwdVelocity(self.model, self.data)
+        self.mj.mj_fwdVelocity(self.model, self.data)
         for field, value, unit in (
             ("qpos", self.data.efc_pos, "m or rad"),
             ("qvel", self.data.efc_vel, "m/s or rad/s"),
@@ -106,24 +162,24 @@ class Machine:
 
     def _set(self, data: Any, y: Array) -> None:
         data.qpos[:], data.qvel[:] = y[: self.nq], y[self.nq : self.nq + self.nv]
-        self._mj.mj_normalizeQuat(self.model, data.qpos)
+        self.mj.mj_normalizeQuat(self.model, data.qpos)
 
     def place(self, q: Array) -> Any:
         """The data with all frames at coordinates q."""
         if not np.array_equal(self.data.qpos, q):
             self.data.qpos[:] = q
-            self._mj.mj_normalizeQuat(self.model, self.data.qpos)
-        self._mj.mj_kinematics(self.model, self.data)
+            self.mj.mj_normalizeQuat(self.model, self.data.qpos)
+        self.mj.mj_kinematics(self.model, self.data)
         return self.data
 
     def coordinate_rates(self, q: Array, v: Array) -> Array:
         """q' of coordinates q at rates v, shape (nq,), float64: v itself, of quaternions q' = q (0, omega) / 2."""
         rates = np.empty(self.nq)
         for kind, at, dof in zip(self.model.jnt_type, self.model.jnt_qposadr, self.model.jnt_dofadr, strict=True):
-            if kind >= int(self._mj.mjtJoint.mjJNT_SLIDE):
+            if kind >= int(self.mj.mjtJoint.mjJNT_SLIDE):
                 rates[at] = v[dof]
                 continue
-            if kind == int(self._mj.mjtJoint.mjJNT_FREE):
+            if kind == int(self.mj.mjtJoint.mjJNT_FREE):
                 rates[at : at + 3], at, dof = v[dof : dof + 3], at + 3, dof + 3
             w, x, y, z = q[at : at + 4]
             a, b, c = v[dof : dof + 3]
@@ -146,7 +202,7 @@ class Machine:
 
     def advance(self, y: Array) -> Any:
         """The data with all forces and accelerations at y."""
-        mj, model, data = self._mj, self.model, self.data
+        mj, model, data = self.mj, self.model, self.data
         self._set(data, y)
         data.ctrl[:] = self.ctrl
         data.qfrc_applied[:] = self.own_forces(data.qpos, data.qvel)
@@ -180,8 +236,8 @@ class Machine:
         """J v a time [s] later at the same rates."""
         beside = self._beside
         beside.qpos[:] = self.data.qpos
-        self._mj.mj_integratePos(self.model, beside.qpos, self.data.qvel, span)
-        self._mj.mj_fwdPosition(self.model, beside)
+        self.mj.mj_integratePos(self.model, beside.qpos, self.data.qvel, span)
+        self.mj.mj_fwdPosition(self.model, beside)
         return np.array(beside.efc_J).reshape(beside.nefc, self.nv) @ self.data.qvel
 
     def loop_jacobian(self) -> Array:
@@ -191,7 +247,7 @@ class Machine:
     def mass_matrix(self) -> Array:
         """M at the latest data, with armature [kg, kg m, kg m^2], shape (nv, nv), float64."""
         M = np.zeros((self.nv, self.nv))
-        self._mj.mj_fullM(self.model, self.data, M)
+        self.mj.mj_fullM(self.model, self.data, M)
         return M
 
     def mobility(self) -> Array:
@@ -203,19 +259,51 @@ class Machine:
     def energies(self, y: Array) -> tuple[float, float]:
         """Kinetic energy, and that less works, plus the potential of gravity and springs, at y [J]."""
         data = self.advance(y)
-        self._mj.mj_energyPos(self.model, data)
+        self.mj.mj_energyPos(self.model, data)
         kinetic = 0.5 * float(data.qvel @ self.mass_matrix() @ data.qvel)
         return kinetic, kinetic + float(data.energy[0]) - float(y[-2:].sum())
 
     def point_jacobian(self, body: int, point: Array) -> Array:
         """d(velocity of a point that moves with a body) / d(rates) at the latest data, shape (3, nv), float64."""
         J = np.zeros((3, self.nv))
-        self._mj.mj_jac(self.model, self.data, J, None, np.asarray(point, dtype=np.float64), body)
+        self.mj.mj_jac(self.model, self.data, J, None, np.asarray(point, dtype=np.float64), body)
         return J
 
     def pace(self, v: Array) -> float:
         """Rate at which frames turn or cross the machine [rad/s], for the longest step."""
         extent = max(float(self.model.stat.extent), 1e-9)
-        slides = np.isin(self.model.jnt_type[self.model.dof_jntid], (int(self._mj.mjtJoint.mjJNT_SLIDE),))
+        slides = np.isin(self.model.jnt_type[self.model.dof_jntid], (int(self.mj.mjtJoint.mjJNT_SLIDE),))
         rates = np.abs(np.where(slides, v / extent, v))
         return float(max(rates.max(initial=0.0), np.sqrt(np.linalg.norm(self.model.opt.gravity) / extent)))
+
+    def rates_of(self, joint: int) -> int:
+        """Number of independent rates of a joint."""
+        return {0: 6, 1: 3}.get(int(self.model.jnt_type[joint]), 1)
+
+    def carrier(self, link: int) -> int:
+        """The body that a link without mass and joints belongs to: the next one with mass towards the root."""
+        while link and self.model.body_mass[link] == 0.0 and self.model.body_jntnum[link] == 0:
+            link = int(self.model.body_parentid[link])
+        return link
+
+    def motion(self, link: int) -> Motion:
+        """Pose and motion of a link at the latest data."""
+        J, turning = np.zeros((3, self.nv)), np.zeros((3, self.nv))
+        origin = np.array(self.data.xpos[link])
+        self.mj.mj_jac(self.model, self.data, J, turning, origin, link)
+        v = np.array(self.data.qvel)
+        return Motion(origin, np.array(self.data.xmat[link]).reshape(3, 3), J @ v, turning @ v)
+
+    def point(self, link: int, local: Array) -> Array:
+        """A point in the frame of a link, in the world [m], shape (3,), float64."""
+        return np.array(self.data.xpos[link]) + np.array(self.data.xmat[link]).reshape(3, 3) @ local
+
+    def local(self, link: int, point: Array) -> Array:
+        """A point of the world in the frame of a link [m], shape (3,), float64."""
+        return (point - np.array(self.data.xpos[link])) @ np.array(self.data.xmat[link]).reshape(3, 3)
+
+    def matrix(self, quaternion: Array) -> Array:
+        """The rotation of a quaternion (w, x, y, z) [-], shape (3, 3), float64."""
+        found = np.zeros(9)
+        self.mj.mju_quat2Mat(found, quaternion)
+        return found.reshape(3, 3)

@@ -6,10 +6,13 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from warp_mca.base import validate
 from warp_mca.base.errors import RequestError, bad_value
 
 if TYPE_CHECKING:
+    from warp_mca.robots.masses import MassProperties
     from warp_mca.robots.robot import Robot
 
 SUFFIXES = (".xml", ".mjcf", ".urdf")
@@ -29,8 +32,10 @@ def mujoco(what: str, value: object) -> Any:
     return found
 
 
-def compiled(robot: Robot) -> Any:
-    """The `MjModel` of a robot: fixed links are bodies of their own; contact, limits and dry friction are left to us.
+def compiled(robot: Robot) -> tuple[Any, Any]:
+    """The `MjSpec` and `MjModel` of a robot.
+
+    Fixed links are bodies of their own; contact, limits and dry friction are left to us.
 
     Raises:
         RequestError: the file cannot be read, or holds what a machine does not carry.
@@ -44,13 +49,34 @@ def compiled(robot: Robot) -> Any:
         spec.option.disableflags |= int(getattr(mj.mjtDisableBit, f"mjDSBL_{flag}"))
     spec.option.enableflags &= ~int(mj.mjtEnableBit.mjENBL_SLEEP)
     _add_servos(mj, spec, robot)
-    try:
-        model = spec.compile()
-    except (ValueError, RuntimeError) as error:
-        raise bad_value("Robot.file", robot.path, f"MuJoCo says: {_words(error)}; correct the file") from error
+    model = _compiled(robot, spec)
     for sentence in _refused(mj, model):
         raise bad_value("Robot.file", robot.path, sentence)
-    return model
+    return spec, model
+
+
+def with_masses(mj: Any, robot: Robot, spec: Any, masses: Mapping[str, MassProperties]) -> Any:
+    """The model with other masses, centres and inertias of some links, by name.
+
+    Raises:
+        RequestError: MuJoCo refuses it.
+    """
+    for name, own in masses.items():
+        moments, axes = np.linalg.eigh(own.inertia)
+        axes[:, 2] *= np.linalg.det(axes)
+        turned = np.zeros(4)
+        mj.mju_mat2Quat(turned, axes.reshape(-1))
+        body = spec.body(name)
+        body.explicitinertial, body.mass, body.ipos = True, own.mass, own.centre
+        body.iquat, body.inertia = turned, moments
+    return _compiled(robot, spec)
+
+
+def _compiled(robot: Robot, spec: Any) -> Any:
+    try:
+        return spec.compile()
+    except (ValueError, RuntimeError) as error:
+        raise bad_value("Robot.file", robot.path, f"MuJoCo says: {_words(error)}; correct the file") from error
 
 
 def _parsed(mj: Any, robot: Robot) -> Any:

@@ -21,6 +21,7 @@ from warp_mca.scene.materials import Material
 
 if TYPE_CHECKING:
     from warp_mca.robots.machine import Machine
+    from warp_mca.robots.masses import MassProperties
     from warp_mca.robots.skins import Skin
     from warp_mca.robots.swing import RobotSwing
     from warp_mca.robots.touching import Pair
@@ -50,6 +51,8 @@ class Robot:
         controller: gives the controls at time t [s], coordinates and rates: controller(t, qpos, qvel). It is called at
             each period, and its controls are held in between.
         period: of the controller [s].
+        mounts: node set by which each flexible link is held: by its parent, or by what rides on it, see `strike`.
+            Where several links hold it: a dict of node sets by the name of the other link.
         against: planes and bodies beside the machine that it may touch.
         touch: names of links or geoms: pairs without one of these are not looked at. () for all that the file lets
             collide, and all that may meet `against`.
@@ -65,6 +68,7 @@ class Robot:
     servos: Mapping[str, Any] = field(default_factory=dict)
     controller: Controller | None = None
     period: float | None = None
+    mounts: Mapping[str, Any] = field(default_factory=dict)
     against: tuple[RigidPlane | Body, ...] = ()
     touch: tuple[str, ...] = ()
 
@@ -139,14 +143,65 @@ class Robot:
             raise bad_value("closest gap of the machine [m]", gap, remedy)
         return found
 
+    def strike(
+        self,
+        *,
+        impact: ImpactPhase,
+        stiffness: float = 1e8,
+        mu: float = 0.0,
+        swing: RobotSwing | None = None,
+        name: str = "strike",
+    ) -> Scene:
+        """The machine at its first touch as a scene, to run, to save or to change: an impact by finite elements.
+
+        Flexible links get their meshes, all others are rigid bodies with the file's mass, centre and inertia. Joints
+        are Articulations with springs, dampers, friction, armature, limits and drives, which go on acting at the
+        controls that are held. Of the file's geoms those are meshed that may touch within the impact; a round one has
+        24 faces around, and a node where it touches first. Geoms of the world are held. What the file's link has beyond
+        the mass of its mesh rides on it as a rigid body, "NAME rest", to which it is mounted; where they differ by no
+        more than 2 %, the link swings with the mass of its mesh.
+
+        Args:
+            impact: the phase.
+            stiffness: of contact between rigid surfaces, of each node [N/m]; others have the default of `Contact`.
+            mu: coefficient of friction of all contacts [-]; that of the file is not read.
+            swing: how it came there; None: its swing to the first touch.
+            name: of the scene.
+
+        Raises:
+            RequestError: as in `swing`; the machine has something that an impact does not carry; a controller would be
+                called during the impact; a mesh has more mass than its link, or a flexible link is held nowhere.
+        """
+        from warp_mca.robots.handoff import HandOff
+
+        validate.kinds("Robot.strike", ImpactPhase, "give an ImpactPhase", impact=impact)
+        validate.positive("Robot.strike", stiffness=stiffness)
+        if self.period is not None and self.period < impact.duration:
+            remedy = f"controls are held during an impact, which lasts {impact.duration:g} s; give no shorter one"
+            raise bad_value("Robot.period", self.period, remedy)
+        found = self.swing() if swing is None else swing
+        machine = self._machine()
+        return HandOff(self, machine, found).scene(impact, self._pairs(machine), stiffness, mu, name)
+
+    def mount(self, link: str, other: str | None) -> str:
+        """Node set by which a flexible link is held to another link, or to what rides on it.
+
+        Raises:
+            RequestError: none was given.
+        """
+        given = self.mounts.get(link)
+        found = given.get(other) if isinstance(given, Mapping) else given
+        if not isinstance(found, str):
+            held = "what rides on it" if other is None else other
+            sets = ", ".join(sorted(self.meshes[link].node_sets))
+            remedy = f"name the node set that holds it to {held}; its mesh has {sets}"
+            raise bad_value(f"Robot.mounts[{link!r}]", given, remedy)
+        return found
+
     def _machine(self) -> Machine:
         from warp_mca.robots.machine import Machine
 
-        machine = Machine(self)
-        for name in self.flexible:
-            if name not in machine.names.bodies:
-                raise bad_value("Robot.flexible", name, f"the file's links are {', '.join(machine.names.bodies)}")
-        return machine
+        return Machine(self)
 
     def _pairs(self, machine: Machine) -> list[Pair]:
         from warp_mca.robots.geoms import geom_side
@@ -174,6 +229,17 @@ class Robot:
             turned = found[name].points @ rotation_matrix(body.rotation).T
             found[name] = replace(found[name], points=np.array(body.position) + turned)
         return found
+
+    @cached_property
+    def mesh_masses(self) -> dict[str, MassProperties]:
+        """Mass properties of the meshes of flexible links, in the links' frames."""
+        from warp_mca.physics.elements.cells import nodal_masses
+        from warp_mca.robots.masses import of_nodes
+
+        bodies = tuple(self.flexible.values())
+        scene = Scene(name="robot", bodies=bodies, impact=ImpactPhase(duration=1e-3)) if bodies else None
+        masses = nodal_masses(scene, self.meshes) if scene else {}
+        return {name: of_nodes(self.meshes[name].points, masses[name]) for name in self.flexible}
 
     @cached_property
     def _skins(self) -> dict[str, Skin]:

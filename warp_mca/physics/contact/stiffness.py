@@ -47,9 +47,12 @@ def spring_stiffness(contact: Contact, slave: Faces, master: Faces | None) -> li
     A number f gives f K A^2 / V, and a node the mean of the faces around it. The default takes E* in place of K, so
     that it suits any Poisson's ratio, and is stiffer where one of the surfaces is curved. Where both are flat, nodes
     share the stiffness of faces as they share their area, so that their pressure is uniform, and the springs of the
-    two surfaces are in series. Two passes of one contact have half of it each.
+    two surfaces are in series. Two passes of one contact have half of it each. `stiffness` is that
+    of each node.
     """
     surfaces = [slave] if master is None else [slave, master]
+    if (k := contact.stiffness) is not None:
+        return [(np.full(len(faces.nodes), k), np.full(len(faces.node), k)) for faces in surfaces]
     half = 0.5 if contact.two_way else 1.0
     if contact.penalty is None and not any(is_curved(faces.node, faces.normal) for faces in surfaces):
         near = nearest_faces(contact, slave, master)[: len(surfaces)]
