@@ -24,6 +24,7 @@ FLOOR = mca.RigidPlane(normal=(0.0, 0.0, 1.0))
 HEAD = '<mujoco><compiler angle="radian" autolimits="true"/><option gravity="0 0 -9.81"/>'
 BALL = """<worldbody><body name="ball" pos="0 0 0.5"><freejoint name="free"/>
   <geom name="skin" type="{kind}" size="{size}" mass="1"/></body></worldbody></mujoco>"""
+HEAVY = '<inertial pos="0 0 0" mass="5" diaginertia="1 1 1"/>'
 INERTIA = '<inertia ixx=".01" iyy=".01" izz=".01" ixy="0" ixz="0" iyz="0"/></inertial>'
 URDF = f"""<robot name="stand">
   <link name="base"/>
@@ -92,12 +93,13 @@ def test_flexible_link_touches_with_its_skin(tmp_path):
     """A rod in place of the ball's geom: tilted, it meets the floor with its lowest node."""
     rod = mca.Rod(radius=0.01, length=0.2)
     body = mca.Body(name="any", geometry=rod, material=STEEL, position=(-0.1, 0.0, 0.0), rotation=(0.0, 0.4, 0.0))
-    machine = ball(tmp_path, flexible={"ball": body}, against=(FLOOR,))
+    text = HEAD + BALL.format(kind="sphere", size="0.1").replace("<geom", f"{HEAVY}<geom")
+    machine = robot(text, tmp_path, flexible={"ball": body}, against=(FLOOR,))
     lowest = machine.meshes["ball"].points[:, 2].min()
     swing = machine.swing()
     assert swing.touch.first == "ball"
     assert swing.t_end == pytest.approx(math.sqrt(2.0 * (0.5 + lowest) / G), abs=1e-9)
-    plain = ball(tmp_path, flexible={"ball": rod}, material=STEEL, against=(FLOOR,))
+    plain = robot(text, tmp_path, flexible={"ball": rod}, material=STEEL, against=(FLOOR,))
     assert plain.swing().t_end == pytest.approx(math.sqrt(2.0 * (0.5 - 0.01) / G), abs=1e-9)
 
 

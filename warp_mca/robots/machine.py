@@ -11,7 +11,8 @@ from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.robots.masses import MassProperties, of_link, rest_of
-from warp_mca.robots.reading import Names, compiled, filled, mujoco, with_masses
+from warp_mca.robots.reading import Names, compiled, mujoco, with_masses
+from warp_mca.robots.start import start_of
 
 if TYPE_CHECKING:
     from warp_mca.robots.robot import Robot
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 LIMIT_RATE = 2000.0  # of the spring of a limit on the inertia of its joint [rad/s], with critical damping
 FRICTION_RATE = 1e-2  # rate over which dry friction builds up, as in `RigidPhase.friction_rate` [rad/s, m/s]
 LOOP_RATE = 100.0  # at which gaps of loops decay (Baumgarte, Comput. Methods Appl. Mech. Eng. 1 (1972) 1) [1/s]
-CLOSED = 1e-8  # gap of a loop at the start [m, rad]
 NUDGE = 1e-6  # time for the difference that gives J' v [s]
 
 
@@ -56,7 +56,8 @@ class Machine:
         names: of what the model holds.
         rests: what flexible links have beyond their meshes, by name.
         ctrl: controls that are held, shape (nu,), float64.
-        limited: index of the rate of each joint with a limit, int.
+        limited, limited_q: index of the rate and of the coordinate of each joint with a limit, int.
+        range: its limits [rad, m], shape (count, 2), float64.
         passive: whether the file switches all drives off.
         limit_stiffness: of these limits [N m/rad, N/m], float64.
         limit_damping: of these limits [N m s/rad, N s/m], float64.
@@ -79,11 +80,10 @@ class Machine:
         self.passive = bool(int(self.model.opt.disableflags) & int(self.mj.mjtDisableBit.mjDSBL_ACTUATION))
         scalar = self.model.jnt_type >= int(self.mj.mjtJoint.mjJNT_SLIDE)
         joints = np.flatnonzero(self.model.jnt_limited.astype(bool) & scalar)
-        self._range, self.limited = self.model.jnt_range[joints], self.model.jnt_dofadr[joints]
-        self._limited_q, self._friction = self.model.jnt_qposadr[joints], self.model.dof_frictionloss.copy()
+        self.range, self.limited = self.model.jnt_range[joints], self.model.jnt_dofadr[joints]
+        self.limited_q, self._friction = self.model.jnt_qposadr[joints], self.model.dof_frictionloss.copy()
         self.ctrl = np.zeros(self.model.nu)
-        self.start = self._start(robot)
-        self._check_limits(joints)
+        self.start = start_of(self, robot)
         inertia = 1.0 / np.diag(np.linalg.inv(self.mass_matrix()))[self.limited]
         self.limit_stiffness = inertia * LIMIT_RATE**2
         self.limit_damping = 2.0 * inertia * LIMIT_RATE
@@ -97,35 +97,13 @@ class Machine:
         for name in robot.flexible:
             if name not in self.names.bodies:
                 raise bad_value("Robot.flexible", name, f"the file's links are {', '.join(self.names.bodies)}")
+            if int(self.model.body_weldid[1 + self.names.bodies.index(name)]) == 0:
+                raise bad_value("Robot.flexible", name, "this link never moves; give it as a Body in against")
         own = {name: of_link(self, 1 + self.names.bodies.index(name)) for name in robot.flexible}
         found = {name: rest_of(name, file, robot.mesh_masses[name]) for name, file in own.items()}
         if alike := {name: robot.mesh_masses[name] for name, rest in found.items() if rest is None}:
             self.model = with_masses(self.mj, robot, spec, alike)
         return {name: rest for name, rest in found.items() if rest is not None}
-
-    def _start(self, robot: Robot) -> Array:
-        """Coordinates and rates at the start, shape (nq + nv,), float64; sets the controls too."""
-        model, data, names = self.model, self.data, self.names
-        self.mj.mj_resetData(model, data)
-        if robot.keyframe is not None:
-            keys = self.keyframes
-            if robot.keyframe not in keys:
-                raise bad_value("Robot.keyframe", robot.keyframe, f"the file's are {', '.join(keys) or 'none'}")
-            self.mj.mj_resetDataKeyframe(model, data, keys.index(robot.keyframe))
-        ends = {"q": [*model.jnt_qposadr, self.nq], "v": [*model.jnt_dofadr, self.nv]}
-        place = lambda key: lambda k: slice(int(ends[key][k]), int(ends[key][k + 1]))  # noqa: E731
-        q = filled("Robot.qpos", robot.qpos, np.array(data.qpos), names.joints, place("q"), "joint")
-        v = filled("Robot.qvel", robot.qvel, np.array(data.qvel), names.joints, place("v"), "joint")
-        one = lambda k: slice(k, k + 1)  # noqa: E731
-        ctrl = np.array(data.ctrl)
-        for name, servo in robot.servos.items():
-            ctrl[names.actuators.index(name)] = servo.target
-        self.ctrl = filled("Robot.ctrl", robot.ctrl, ctrl, names.actuators, one, "actuator")
-        y = np.concatenate([q, v])
-        self._set(self.data, y)
-        self.mj.mj_fwdPosition(model, data)
-        self._check_loops()
-        return y
 
     @property
     def keyframes(self) -> list[str]:
@@ -139,28 +117,8 @@ class Machine:
         fixed = self.model.body_weldid[self.model.geom_bodyid] == 0
         return bool((self.model.geom_contype | self.model.geom_conaffinity)[fixed].any())
 
-    def _check_limits(self, joints: Array) -> None:
-        for k, joint in enumerate(joints):
-            q = float(self.start[self._limited_q[k]])
-            low, high = self._range[k]
-            if not low <= q <= high:
-                field = f"Robot.qpos of joint {self.names.joint(int(joint))}"
-                raise bad_value(field, q, f"start within its limits, {low:g} to {high:g}")
-
-    def _check_loops(self) -> None:
-        """Refuse a start that opens loops."""
-        if not self.data.nefc:
-            return
-        self.mj.mj_fwdVelocity(self.model, self.data)
-        for field, value, unit in (
-            ("qpos", self.data.efc_pos, "m or rad"),
-            ("qvel", self.data.efc_vel, "m/s or rad/s"),
-        ):
-            if (worst := float(np.abs(value).max())) > CLOSED:
-                remedy = f"it opens the loops of the file by {worst:.3g} {unit}; give one that keeps them closed"
-                raise bad_value(f"Robot.{field}", "as given", remedy)
-
-    def _set(self, data: Any, y: Array) -> None:
+    def set(self, data: Any, y: Array) -> None:
+        """Give data coordinates and rates."""
         data.qpos[:], data.qvel[:] = y[: self.nq], y[self.nq : self.nq + self.nv]
         self.mj.mj_normalizeQuat(self.model, data.qpos)
 
@@ -194,8 +152,8 @@ class Machine:
         whole force times tanh(rate / FRICTION_RATE).
         """
         force = -self._friction * np.tanh(v / FRICTION_RATE)
-        at, rate = q[self._limited_q], v[self.limited]
-        for depth, sign in ((at - self._range[:, 1], 1.0), (self._range[:, 0] - at, -1.0)):
+        at, rate = q[self.limited_q], v[self.limited]
+        for depth, sign in ((at - self.range[:, 1], 1.0), (self.range[:, 0] - at, -1.0)):
             press = np.maximum(self.limit_stiffness * depth + self.limit_damping * sign * rate, 0.0)
             force[self.limited] -= np.where(depth > 0.0, sign * press, 0.0)
         return force
@@ -203,7 +161,7 @@ class Machine:
     def advance(self, y: Array) -> Any:
         """The data with all forces and accelerations at y."""
         mj, model, data = self.mj, self.model, self.data
-        self._set(data, y)
+        self.set(data, y)
         data.ctrl[:] = self.ctrl
         data.qfrc_applied[:] = self.own_forces(data.qpos, data.qvel)
         mj.mj_fwdPosition(model, data)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warp_mca.base import validate
-from warp_mca.base.errors import RequestError, bad_value
+from warp_mca.base.errors import bad_value
 
 if TYPE_CHECKING:
     from warp_mca.robots.masses import MassProperties
@@ -205,30 +204,3 @@ class Names:
 
     def _name(self, kind: str, k: int) -> str | None:
         return self._mj.mj_id2name(self._model, int(getattr(self._mj.mjtObj, f"mjOBJ_{kind}")), k)
-
-
-def filled(field: str, given: object, start: Any, names: list[str], places: Callable[[int], slice], what: str) -> Any:
-    """A copy of the vector `start` with what is given for it: all of it, or parts by the name of joint or actuator.
-
-    Raises:
-        RequestError: a name is not known, or the numbers are not as many as needed.
-    """
-    values = start.copy()
-    if given is None:
-        return values
-    if not isinstance(given, Mapping):
-        if not validate.is_list(given) or len(given) != len(start):  # pyright: ignore[reportArgumentType]
-            remedy = f"give {len(start)} finite numbers, or some by the name of the {what}"
-            raise bad_value(field, validate.brief(given), remedy)
-        values[:] = given
-        return values
-    for name, value in given.items():
-        if name not in names:
-            raise bad_value(field, name, f"the file's {what}s are {', '.join(names) or 'none'}")
-        place = places(names.index(name))
-        entry = (value,) if validate.is_number(value) else value
-        if not validate.is_list(entry) or len(entry) != place.stop - place.start:
-            count = place.stop - place.start
-            raise RequestError(f"{field}[{name!r}] = {validate.brief(value)}: give {count} finite number(s)")
-        values[place] = entry
-    return values
