@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 AROUND = 48  # faces around a round geom, which then lies at most 0.2 % of its radius inside
 ON_RIM = 1e-6  # share of a radius within which a point lies on the rim of a cylinder
-MOST_RINGS = 64  # of nodes along the side of a capsule, which are half a radius apart
+MOST_RINGS = 64  # of nodes along the side of a capsule, which are a radius apart
 _BOX = np.array([list(map(int, face)) for face in "032 021 456 467 015 054 126 165 237 276 304 347".split()], np.int32)
 _CORNERS = np.array(
     [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]], dtype=float
@@ -63,7 +63,7 @@ def geom_surface(mj: Any, machine: Machine, geom: int, name: str, around: int = 
     outline = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     if known[kind] == "CAPSULE":
         low, high = a * outline[: around // 4 + 1] - (0.0, b), a * outline[around // 4 :] + (0.0, b)
-        rings = np.linspace(-b, b, 1 + min(max(math.ceil(4.0 * b / a), 1), MOST_RINGS))[1:-1]
+        rings = np.linspace(-b, b, 1 + min(max(math.ceil(2.0 * b / a), 1), MOST_RINGS))[1:-1]
         side = np.stack([np.full(len(rings), a), rings], axis=1)
         return _turned(np.concatenate([low, side, high]), around)
     points, faces = _turned(outline, around)
