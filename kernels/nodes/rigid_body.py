@@ -14,6 +14,7 @@ from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.nodes.cluster import Clusters, spin_after
 from warp_mca.kernels.nodes.coupling import turned
 from warp_mca.kernels.nodes.gather import Kind, NodeData, NodeState, move, total_force_function
+from warp_mca.kernels.nodes.jointed_rows import jointed_lightness, place_joints, satisfy_joints
 from warp_mca.kernels.nodes.rigid_motion import Poses, RigidBodies, RigidStep, find_motion, turned_by
 from warp_mca.kernels.nodes.rigid_pins import find_cluster, pull_cluster
 from warp_mca.kernels.nodes.rigid_rows import RigidRows, place_row, row_lightness, satisfy
@@ -91,14 +92,17 @@ def count_riders(
 
 
 @cache
-def advance_kernel(own: Kind) -> Any:
+def advance_kernel(own: Kind, jointed: bool = False) -> Any:
     """Kernel: momentum, spin and pose of rigid bodies by a step; a block of threads takes a group's bodies in turn.
+
+    `jointed`: joints between whole bodies connect some.
 
     v(n+1/2) follows from the forces at t(n) in `kick` [s], and takes nodes to t(n+1) in `span` [s]; poses move on with
     `moves`. kick = span = -dt / 2 and -dt without it give the motion of the step before the first one. impulse_out
     takes the impulses of joints, see `constraint.bound_kernel`.
     """
     vec3, load_body = scalars(own.precision).vec3, load_function(own)
+    lightness = jointed_lightness if jointed else row_lightness
 
     @wp.kernel(enable_backward=False, module="unique")
     def advance_rigid(
@@ -129,13 +133,17 @@ def advance_kernel(own: Kind) -> Any:
         if size > 0:
             for r in range(begin + lane, begin + size, wp.block_dim()):
                 place_row(r, rows, span, poses_out, step_out)
+            if wp.static(jointed):
+                place_joints(k, lane, kick, span, moves, bodies, rows, poses_out, impulse_out, step_out)
             wait_for_block()
             for e in range(lane, size * size, wp.block_dim()):
-                speed = row_lightness(begin + e // size, begin + e % size, bodies, rows, moves, step_out)
+                speed = lightness(begin + e // size, begin + e % size, bodies, rows, moves, step_out)
                 step_out.matrix[rows.entry[k] + e] = speed
             wait_for_block()
-            if lane == 0:
-                factorise(rows.entry[k], size, step_out.matrix)
+            factorise(rows.entry[k], size, lane, step_out.matrix)
+            if wp.static(jointed):
+                satisfy_joints(k, lane, span, moves, bodies, rows, clusters, poses_out, impulse_out, step_out)
+            elif lane == 0:
                 satisfy(k, span, moves, bodies, rows, clusters, poses_out, impulse_out, step_out)
         wait_for_block()
         if moves:

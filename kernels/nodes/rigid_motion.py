@@ -19,6 +19,7 @@ The scheme is symplectic, so that the energy of a free body does not drift.
 import warp as wp
 
 from warp_mca.kernels.nodes.cluster import Mean
+from warp_mca.kernels.nodes.joint_arrays import JointPoses, JointStep
 
 SOLVES = 50  # steps of Newton's method at most
 ROUNDING = 1e-15  # change of the rotation of a step, relative, at which the steps end
@@ -62,6 +63,7 @@ class Poses:
         momentum: P at the latest half step [kg m/s], shape (body_count,), vec3d.
         spin: L at the latest half step [kg m^2/s], shape (body_count,), vec3d.
         orientation: rotation of the cluster of each pin [-], shape (pin_count,), quatd.
+        joints: state of the joints between whole bodies.
     """
 
     centre: wp.array(dtype=wp.vec3d)
@@ -69,6 +71,7 @@ class Poses:
     momentum: wp.array(dtype=wp.vec3d)
     spin: wp.array(dtype=wp.vec3d)
     orientation: wp.array(dtype=wp.quatd)
+    joints: JointPoses
 
 
 @wp.struct
@@ -91,6 +94,7 @@ class RigidStep:
         point: P of each pin at t(n), from the place at the start [m], shape (pin_count,), vec3d.
         impulse: J and T of each pin on its cluster [N s], [N m s], shape (pin_count, 2), vec3d.
         place, axis: of each pin on its cluster at t(n+1) [m], [-], shape (pin_count,), vec3d.
+        joints: what joints between whole bodies compute.
     """
 
     force: wp.array(dtype=wp.vec3d)
@@ -109,6 +113,7 @@ class RigidStep:
     impulse: wp.array2d(dtype=wp.vec3d)
     place: wp.array(dtype=wp.vec3d)
     axis: wp.array(dtype=wp.vec3d)
+    joints: JointStep
 
 
 @wp.func

@@ -9,6 +9,7 @@ steps reach rounding.
 import warp as wp
 
 from warp_mca.kernels.nodes.cluster import Clusters
+from warp_mca.kernels.nodes.joint_arrays import RigidJoints
 from warp_mca.kernels.nodes.rigid_motion import Poses, RigidBodies, RigidStep, find_motion, turned_by
 from warp_mca.kernels.nodes.rigid_pins import move_pin, pin_lightness
 from warp_mca.kernels.nodes.symmetric import solve_factorised
@@ -37,6 +38,9 @@ class RigidRows:
             there [-], shape (row_count,), vec3d.
         pair: that takes the row's impulse, -1 where none does, shape (row_count,), int32.
         sign: of this impulse, 1 where the first body is the joint's first one, else -1, shape (row_count,), float64.
+        joint: between whole bodies that the row belongs to, -1 of others, shape (row_count,), int32.
+        rate: of its freedoms that the row holds back, -1 of others, shape (row_count,), int32.
+        joints: these.
     """
 
     member: wp.array(dtype=wp.int32)
@@ -54,6 +58,9 @@ class RigidRows:
     twist: wp.array(dtype=wp.vec3d)
     pair: wp.array(dtype=wp.int32)
     sign: wp.array(dtype=wp.float64)
+    joint: wp.array(dtype=wp.int32)
+    rate: wp.array(dtype=wp.int32)
+    joints: RigidJoints
 
 
 @wp.func
@@ -74,7 +81,12 @@ def lightness(
 
 @wp.func
 def place_row(r: int, rows: RigidRows, span: wp.float64, poses: Poses, step_out: RigidStep):
-    """n and twist at t(n), levers on both bodies, and the speed that closes the opening along n in the step [m/s]."""
+    """n and twist at t(n), levers on both bodies, and the speed that closes the opening along n in the step [m/s].
+
+    Rows of joints between whole bodies have their own, see `rigid_joints`.
+    """
+    if rows.joint[r] >= 0:
+        return
     a = rows.first[r]
     b = rows.second[r]
     n = rows.direction[r]
@@ -121,25 +133,30 @@ def opening(
     poses: Poses,
     step_out: RigidStep,
 ) -> wp.float64:
-    """Negative speeds at which rows would open by t(n+1) [m/s], and the greatest; directions open in rad/s."""
+    """Negative speeds at which rows would open by t(n+1) [m/s], and the greatest; directions open in rad/s.
+
+    Those of joints between whole bodies are known already.
+    """
     worst = wp.float64(0.0)
     for r in range(begin, end):
-        a = rows.first[r]
-        b = rows.second[r]
-        v = step_out.velocity[a] + step_out.rate[a] * rows.first_arm[r]
-        if b >= 0:
-            v -= step_out.velocity[b] + step_out.rate[b] * rows.second_arm[r]
-        n = step_out.normal[r]
-        speed = wp.dot(n, v) + step_out.gap[r]
-        p = rows.pin[r]
-        if p >= 0:
-            axis = clusters.axis[p]
-            d = wp.quat_rotate(poses.rotation[a], axis) + span * (step_out.rate[a] * axis)
-            speed += (wp.dot(step_out.twist[r], wp.cross(step_out.axis[p], d)) - wp.dot(n, step_out.place[p])) / span
-            if not moves:
-                speed = wp.float64(0.0)
-        step_out.value[r] = -speed
-        worst = wp.max(worst, wp.abs(speed))
+        if rows.joint[r] < 0:
+            a = rows.first[r]
+            b = rows.second[r]
+            v = step_out.velocity[a] + step_out.rate[a] * rows.first_arm[r]
+            if b >= 0:
+                v -= step_out.velocity[b] + step_out.rate[b] * rows.second_arm[r]
+            n = step_out.normal[r]
+            speed = wp.dot(n, v) + step_out.gap[r]
+            p = rows.pin[r]
+            if p >= 0:
+                axis = clusters.axis[p]
+                d = wp.quat_rotate(poses.rotation[a], axis) + span * (step_out.rate[a] * axis)
+                off = wp.dot(step_out.twist[r], wp.cross(step_out.axis[p], d)) - wp.dot(n, step_out.place[p])
+                speed += off / span
+                if not moves:
+                    speed = wp.float64(0.0)
+            step_out.value[r] = -speed
+        worst = wp.max(worst, wp.abs(step_out.value[r]))
     return worst
 
 
@@ -159,6 +176,8 @@ def give_impulses(
         b = rows.second[r]
         size = step_out.value[r]
         J = size * step_out.normal[r]
+        if rows.joint[r] >= 0:
+            step_out.joints.total[r] = step_out.joints.total[r] + size
         poses_out.momentum[a] = poses_out.momentum[a] + J
         poses_out.spin[a] = poses_out.spin[a] + size * wp.quat_rotate(poses_out.rotation[a], step_out.lever[r, 0])
         if b >= 0:

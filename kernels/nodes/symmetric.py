@@ -2,12 +2,15 @@
 
 import warp as wp
 
+from warp_mca.kernels.hardware.block import wait_for_block
+
 DEPENDENT = 1e-10  # a row is dependent if its pivot is below this share of its diagonal entry
 
 
 @wp.func
-def factorise(first: int, size: int, matrix_out: wp.array(dtype=wp.float64)):
-    """Factorise a symmetric matrix as L D L^T in place. D is on the diagonal; it is 0 for dependent rows."""
+def factorise(first: int, size: int, lane: int, matrix_out: wp.array(dtype=wp.float64)):
+    """Factorise a symmetric matrix as L D L^T in place, by all threads of a block. D is on the diagonal; it is 0 for
+    dependent rows."""
     for j in range(size):
         pivot = matrix_out[first + j * size + j]
         least = wp.float64(DEPENDENT) * pivot
@@ -16,8 +19,10 @@ def factorise(first: int, size: int, matrix_out: wp.array(dtype=wp.float64)):
             pivot -= x * x * matrix_out[first + k * size + k]
         if pivot <= least:
             pivot = wp.float64(0.0)
-        matrix_out[first + j * size + j] = pivot
-        for i in range(j + 1, size):
+        wait_for_block()
+        if lane == 0:
+            matrix_out[first + j * size + j] = pivot
+        for i in range(j + 1 + lane, size, wp.block_dim()):
             x = matrix_out[first + i * size + j]
             for k in range(j):
                 y = matrix_out[first + j * size + k] * matrix_out[first + k * size + k]
@@ -27,6 +32,7 @@ def factorise(first: int, size: int, matrix_out: wp.array(dtype=wp.float64)):
             else:
                 x = wp.float64(0.0)
             matrix_out[first + i * size + j] = x
+        wait_for_block()
 
 
 @wp.func

@@ -13,7 +13,7 @@ from warp_mca.geometry.mass_properties import HEAVIEST, LIGHTEST, Matrix, inerti
 from warp_mca.geometry.mesh import Mesh
 
 CARRIERS = "inertia"  # node set of the corners that carry a given mass
-LEAST = 1e-5  # half an edge over the longest, at least: an inertia is then off by its square
+LEAST = 1e-4  # half an edge over the longest, at least: an inertia is then off by its square
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -25,7 +25,7 @@ def inertia_matrix(owner: str, inertia: object) -> Matrix:
     shape = "give three principal values or a 3 x 3 matrix of finite numbers, in kg m^2"
     try:
         found = np.array(inertia, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise bad_value(field, validate.brief(inertia), shape) from error
     found = np.diag(found) if found.shape == (3,) else found
     if found.shape != (3, 3) or not np.isfinite(found).all():

@@ -19,6 +19,7 @@ from warp_mca.model.model import Model
 from warp_mca.physics.contact.skin_edges import EdgePass, no_edges
 from warp_mca.physics.contact.surfaces import ContactPass
 from warp_mca.physics.loads.nodal import check_batch
+from warp_mca.physics.rigid.body_joints import check_alike
 from warp_mca.scene.contact_laws import DampedPenalty, Penalty
 from warp_mca.scene.loads import ThermalStrain
 
@@ -32,6 +33,7 @@ _COUNTS: dict[str, Callable[[Model], int]] = {
     "table entries": lambda model: len(model.table_time),
     "rigid bodies": lambda model: len(model.rigid_bodies),
     "rigid pins": lambda model: len(model.rigid_pins),
+    "body joints": lambda model: len(model.body_joints),
 }
 
 
@@ -49,6 +51,7 @@ def join_models(models: Sequence[Model]) -> Model:
     if len(models) == 1:
         return models[0]
     check_batch([model.loads for model in models])
+    check_alike(models)
     if any(model.fails and model.passes for model in models):
         remedy = "contact follows it in single runs alone; use run in place of run_batch"
         raise bad_value("failure of materials", "given", remedy)

@@ -26,7 +26,7 @@ from warp_mca.physics.contact.surfaces import ContactPass
 from warp_mca.physics.joints.constraints import check_bindings, constraints, free_nodes, join_bodies, nodes_of
 from warp_mca.physics.loads.joint_loads import hinge_loads, movable_bases
 from warp_mca.physics.loads.nodal import LoadedNodes, loaded_nodes
-from warp_mca.physics.rigid.bodies import RigidBody, check_loads, flexible, own_nodes, rigid_bodies
+from warp_mca.physics.rigid.bodies import Rigid, check_loads, flexible, own_nodes, rigid_bodies
 from warp_mca.physics.rigid.stable_step import bounce_factor, stable_with_rigid
 from warp_mca.physics.ties.nodes import check_ties, on_faces, tied_nodes, velocities
 from warp_mca.scene import ContactAll, RigidPlane, Scene
@@ -111,7 +111,7 @@ def build_model(
     check_ties(ties, held, [nodes_of(pairs), absorbing.node, *(body.nodes for body in rigid.bodies)])
     added, parts.relief = ties.shared(added, parts.mass), ties.relief(parts.mass)
     found: dict[str, Any] = {**_bodies(parts, watched), **held, **pairs}
-    found |= _steps(parts, rigid.bodies, added, velocity, passes, loads)
+    found |= _steps(parts, rigid, added, velocity, passes, loads)
     model = Model(
         V=velocity,
         **found,
@@ -129,6 +129,7 @@ def build_model(
         rigid_bodies=rigid.bodies,
         rigid_rows=rigid.rows,
         rigid_pins=rigid.pins,
+        body_joints=rigid.joints,
     )
     return grouping(model, OwnSteps(parts, added, share_of_step(parts, velocity))) if grouping else model
 
@@ -154,14 +155,14 @@ def _bodies(parts: Assembly, watched: Sequence[tuple[str, int]]) -> dict[str, An
 
 def _steps(
     parts: Assembly,
-    bodies: Sequence[RigidBody],
+    rigid: Rigid,
     added: Array,
     velocity: Array,
     passes: Sequence[ContactPass],
     loads: Mapping[str, Sequence[LoadedNodes]],
 ) -> dict[str, Any]:
     """Stable step and mass scaling, by the name of the attribute; mass scaling raises the masses of the assembly."""
-    plain = stable_with_rigid(parts, bodies, added, velocity) if bodies else parts.stable(added)
+    plain = stable_with_rigid(parts, rigid, added, velocity) if rigid.bodies else parts.stable(added)
     stable, scaling = scale_masses(parts, added, plain)
     decay = sum(item.decay for item in passes) + greatest_decay(loads, parts.mass)
     stable = with_damping(with_viscosity(stable, parts, velocity, decay), parts, loads, added, decay)

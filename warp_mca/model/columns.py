@@ -5,24 +5,29 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from warp_mca.kernels.records.columns import PASS, PASS_COLUMNS
+from warp_mca.physics.rigid.body_joints import BodyJoint
+from warp_mca.physics.rigid.body_joints import readings as joint_readings
 from warp_mca.scene.loads import LOADS
 
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
 
 
+JOINTS = "joints"  # name of the actor whose columns are those of joints between whole bodies
 FAILURE = "failure"  # entry of the ledger: elastic and hourglass energy that went with elements that failed
 
 
 class Added(NamedTuple):
     """Columns of one actor: the first, the entries of the ledger to which they add, and what stands behind these.
 
-    `readings` are columns of the history: each one of `Load.readings` of all loads, then the next.
+    `readings` are columns of the history: each one of `Load.readings` of all loads, then the next. The first `means` of
+    them are integrals over time, of which the history has the means over the interval before.
     """
 
     first: int
     energies: tuple[str, ...]
     readings: tuple[str, ...] = ()
+    means: int = 0
 
     @property
     def end(self) -> int:
@@ -36,7 +41,7 @@ def pass_count(model: Model) -> int:
 
 
 def added_columns(model: Model) -> dict[str, Added]:
-    """Columns of each actor that adds some, by its name: loads, elements that may fail, absorbing boundaries.
+    """Columns of each actor that adds some, by its name: loads, elements that may fail, absorbing boundaries, joints.
 
     All scenes of a batch have the same kinds of loads, and elements that may fail or none; those without absorbing
     boundaries read fewer columns.
@@ -48,6 +53,9 @@ def added_columns(model: Model) -> dict[str, Added]:
     for name, (energies, readings) in kinds.items():
         found[name] = Added(first, energies, readings)
         first = found[name].end
+    if model.body_joints:
+        means, values = joint_readings([item for item in model.body_joints if item.scene == 0])
+        found[JOINTS] = Added(first, BodyJoint.ENERGIES, (*means, *values), len(means))
     return found
 
 

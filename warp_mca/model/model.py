@@ -21,6 +21,7 @@ from warp_mca.physics.joints.couplings import Coupling
 from warp_mca.physics.loads.joint_loads import HingeLoad, MovableBase
 from warp_mca.physics.loads.nodal import LoadedNodes
 from warp_mca.physics.rigid.bodies import RigidBody
+from warp_mca.physics.rigid.body_joints import BodyJoint
 from warp_mca.physics.rigid.rows import RigidPin, RigidRow
 from warp_mca.physics.ties.nodes import TiedNodes
 
@@ -67,6 +68,7 @@ class Model:
         scaling: what mass scaling added to `mass`, or None.
         batch: where the scenes of a batch lie, or None for a model of one scene.
         rigid_bodies, rigid_rows, rigid_pins: rigid bodies, those of each scene in turn, and what binds them.
+        body_joints: joints between whole bodies, of which a rigid one.
         rigid_blocks: their elements, which are shown but not computed; `element_of` lists them behind the others. Empty
             in a batch.
         rates: groups of elements that take steps of their own, or None where all take the same.
@@ -109,6 +111,7 @@ class Model:
     rigid_bodies: tuple[RigidBody, ...] = field(default=(), metadata=ITEMS)
     rigid_rows: tuple[RigidRow, ...] = field(default=(), metadata=ITEMS)
     rigid_pins: tuple[RigidPin, ...] = field(default=(), metadata=ITEMS)
+    body_joints: tuple[BodyJoint, ...] = field(default=(), metadata=ITEMS)
     rigid_blocks: tuple[Block, ...] = field(default=(), metadata=GIVEN)
     rates: Rates | None = field(default=None, metadata=ALONE)
     loads: Mapping[str, tuple[LoadedNodes, ...]] = field(default_factory=dict, metadata=ITEMS)

@@ -138,6 +138,10 @@ def history_columns(ledger: Ledger, first: int = 0) -> dict[str, Array]:
     for own in added_columns(model).values():
         begin = own.first + len(own.energies)
         columns |= {name: table[:, begin + k] for k, name in enumerate(own.readings)}
+        earlier = ledger.table(max(first - 1, 0)) if own.means else table
+        for k, name in enumerate(own.readings[: own.means]):
+            change = np.diff(earlier[:, begin + k], prepend=earlier[:1, begin + k]) / steps.interval
+            columns[name] = change[min(first, 1) :]
     added = {name for own in added_columns(model).values() for name in own.energies} - {"external_work"}
     return columns | {f"E_{name}": energy[name] for name in sorted(added)}
 

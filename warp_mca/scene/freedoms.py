@@ -144,7 +144,7 @@ def check_limits(owner: str, limits: object) -> None:
         raise bad_value(f"{owner}.limits", limits, "give two finite numbers, the lower one first")
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Whole:
     """What a joint between whole bodies says of them, see `scene.articulations.Articulation`.
 

@@ -48,4 +48,8 @@ def joint_impulses(solver: Solver, state: State, scene: int = 0) -> dict[str, li
     """Impulse that each joint of a scene gave to its first body [N s], by name."""
     impulse = state.constraints.impulse.numpy()
     joints = solver.model.joints[solver.layout.joints[scene] : solver.layout.joints[scene + 1]]
-    return {joint.name: impulse[joint.start : joint.end].sum(axis=0).tolist() for joint in joints}
+    found = {joint.name: impulse[joint.start : joint.end].sum(axis=0).tolist() for joint in joints}
+    if whole := solver.model.body_joints:
+        given = state.rigid.joints.impulse.numpy().reshape(len(whole), -1)[:, :3]
+        found |= {item.name: own.tolist() for item, own in zip(whole, given, strict=True) if item.scene == scene}
+    return found

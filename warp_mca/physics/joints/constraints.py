@@ -100,6 +100,10 @@ class _Tied:
 
 def _tied_pairs(parts: Assembly, joint: Joint, start: int) -> _Tied:
     """What a joint ties, whose pairs begin at `start`."""
+    if joint.whole() is not None:
+        nodes = [parts.nodes(*own) for own in joint.sets().values()]
+        a = np.concatenate([np.zeros(0, np.int32), *nodes])
+        return _Tied(a, np.full(len(a), GROUND, dtype=np.int32), np.zeros((len(a), 3, 3)), np.zeros((0, 3), np.int32))
     side = _side(parts, joint.body)
     other = None if joint.other is None else _side(parts, joint.other)
     ties = validate.call(joint.title, "ties()", "it", _ties_of, joint, side, other)

@@ -18,6 +18,7 @@ from warp_mca.physics.joints.constraints import JointPairs
 from warp_mca.physics.joints.couplings import Coupling
 from warp_mca.physics.loads.joint_loads import MovableBase
 from warp_mca.physics.loads.nodal import LoadedNodes
+from warp_mca.physics.rigid.body_joints import BodyJoint, join_whole
 from warp_mca.physics.rigid.rows import RigidPin, RigidRow, check_joint, fixed_rows, joint_rows, pin_of, pin_rows
 from warp_mca.scene import Scene
 
@@ -67,11 +68,12 @@ class RigidBody:
 
 
 class Rigid(NamedTuple):
-    """Rigid bodies of a scene, rows and pins, as `Model` has them."""
+    """Rigid bodies of a scene, rows, pins and joints, as `Model` has them."""
 
     bodies: tuple[RigidBody, ...] = ()
     rows: tuple[RigidRow, ...] = ()
     pins: tuple[RigidPin, ...] = ()
+    joints: tuple[BodyJoint, ...] = ()
 
 
 def own_nodes(parts: Assembly) -> dict[str, Index]:
@@ -138,7 +140,8 @@ def rigid_bodies(
         owner[own] = place
     _check_drives(parts)
     coupled = {item.start: item for item in couplings}
-    for joint, found in zip(parts.scene.joints, joints, strict=True):
+    tied = [item for item in zip(parts.scene.joints, joints, strict=True) if item[0].whole() is None]
+    for joint, found in tied:
         check_joint(joint, pairs, found, owner, found.start in coupled)
     touched = np.zeros(len(parts.X), dtype=bool)
     for item in passes:
@@ -148,7 +151,7 @@ def rigid_bodies(
     bodies = [_body(parts, name, own, touched, pairs, owner) for name, own in nodes.items()]
     pins: list[RigidPin] = []
     rows = []
-    for found in joints:
+    for _, found in tied:
         if found.start in coupled and (item := pin_of(coupled[found.start], pairs, owner)):
             rows += pin_rows(item, len(pins), found.start, bool(owner[pairs["joint_first"][found.start]] == GROUND))
             pins.append(item)
@@ -156,7 +159,8 @@ def rigid_bodies(
             rows += joint_rows(parts, pairs, found, owner, coupled.get(found.start))
     for place, body in enumerate(bodies):
         rows += fixed_rows(parts, place, body.name, body.centre, body.radius, velocity)
-    return Rigid(tuple(bodies), tuple(rows), tuple(pins))
+    whole = join_whole(parts, pairs, joints, bodies, velocity, len(pins))
+    return Rigid(tuple(bodies), (*rows, *whole.rows), (*pins, *whole.pins), whole.joints)
 
 
 def _check_drives(parts: Assembly) -> None:

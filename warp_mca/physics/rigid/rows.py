@@ -33,6 +33,8 @@ class RigidRow:
         sign: of this impulse: -1 where the first body is the second one of its joint.
         pin: place in `Model.rigid_pins` of the cluster that stands in for the second body, -1 without one.
         twist: axis of a row that holds a direction of a pin [-], shape (3,), float64; n is 0 there.
+        joint: place in `Model.body_joints` of the joint that finds the direction itself, -1 of other rows.
+        rate: of that joint that the row holds back, -1 of rows that hold the joint.
     """
 
     first: int = field(metadata=of("rigid bodies"))
@@ -43,6 +45,8 @@ class RigidRow:
     sign: float = field(default=1.0, metadata=AS_IS)
     pin: int = field(default=-1, metadata=of("rigid pins"))
     twist: Array = field(default_factory=lambda: np.zeros(3), metadata=AS_IS)
+    joint: int = field(default=-1, metadata=of("body joints"))
+    rate: int = field(default=-1, metadata=AS_IS)
 
 
 @joinable

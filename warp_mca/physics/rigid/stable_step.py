@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from warp_mca.base.arrays import Array
-from warp_mca.model.assembly import Assembly
+from warp_mca.kernels.nodes.joint_arrays import ARMATURE, KP, LIMIT_STIFFNESS, STIFFNESS
+from warp_mca.model.assembly import GROUND, Assembly
 from warp_mca.model.stable_step import BOUNCE, USUAL_SCALE, StableStep
-from warp_mca.physics.rigid.bodies import RigidBody
+from warp_mca.physics.rigid.bodies import Rigid, RigidBody
 from warp_mca.scene import Contact, RigidPlane, Scene
 
 WHOLE = 100.0
@@ -28,7 +28,7 @@ def bounce_factor(contact: Contact, scene: Scene) -> float:
     return WHOLE if alone and scene.body(contact.slave.body).rigid else 1.0
 
 
-def stable_with_rigid(parts: Assembly, bodies: Sequence[RigidBody], added: Array, velocity: Array) -> StableStep:
+def stable_with_rigid(parts: Assembly, rigid: Rigid, added: Array, velocity: Array) -> StableStep:
     """Stable step of a scene with rigid bodies.
 
     Each spring between a rigid body and another one counts half to either, see docs/theory.md: that of the other
@@ -37,13 +37,14 @@ def stable_with_rigid(parts: Assembly, bodies: Sequence[RigidBody], added: Array
 
     Args:
         parts: of the scene.
-        bodies: its rigid bodies, one at least.
+        rigid: its rigid bodies, one at least, and joints.
         added: what contact springs would add to the eigenvalue at each node [1/s^2], shape (node_count,), float64.
         velocity: initial velocities [m/s], shape (node_count, 3), float64.
 
     Raises:
         RequestError: as in `stable_step.stable_step`.
     """
+    bodies = rigid.bodies
     own = np.concatenate([body.own for body in bodies])
     others = added.copy()
     others[own] = 0.0
@@ -59,7 +60,35 @@ def stable_with_rigid(parts: Assembly, bodies: Sequence[RigidBody], added: Array
         rate = _rate(body, parts, velocity)
         if rate * found.dt > TURN:
             found = replace(found, dt=TURN / rate, element=element, contact_share=0.0)
+    stiffest, body = _stiffest(rigid)
+    if stiffest * found.dt**2 > 4.0:
+        element = parts.element_start[bodies[body].name]
+        found = replace(found, dt=2.0 / math.sqrt(stiffest), element=element, contact_share=0.0)
     return found
+
+
+def _stiffest(rigid: Rigid) -> tuple[float, int]:
+    """Largest eigenvalue [1/s^2] of free rigid bodies on the springs of their joints, and a body that moves with it.
+
+    Springs of limits count WHOLE times. What joints hold moves less, and rotors make it slower.
+    """
+    count = 6 * len(rigid.bodies)
+    K, most = np.zeros((count, count)), (0.0, 0)
+    for item in rigid.joints:
+        screws, k = item.screws(), item.drive[:, [STIFFNESS, KP]].sum(axis=1) + WHOLE * item.drive[:, LIMIT_STIFFNESS]
+        for F, stiffness, A in zip(np.linalg.pinv(screws).T, k, item.drive[:, ARMATURE], strict=True):
+            row = np.zeros(count)
+            for b, sign in ((item.body, 1.0), (item.other, -1.0)):
+                if b != GROUND and stiffness > 0.0:
+                    body = rigid.bodies[b]
+                    moment = item.length * F[:3] + np.cross(item.place - body.centre, F[3:])
+                    half = np.linalg.cholesky(np.linalg.inv(body.inertia)).T
+                    row[6 * b : 6 * b + 6] = sign * np.concatenate([F[3:] / math.sqrt(body.mass), half @ moment])
+            K += stiffness / (1.0 + A * (row @ row)) * np.outer(row, row)
+    if K.any():
+        values, vectors = np.linalg.eigh(K)
+        most = float(values[-1]), int(np.abs(vectors[:, -1]).argmax()) // 6
+    return most
 
 
 def _largest(body: RigidBody, X: Array, stiffness: Array) -> float:

@@ -18,6 +18,7 @@ from warp_mca.kernels.nodes.rigid_motion import Poses, RigidBodies, RigidStep
 from warp_mca.kernels.nodes.rigid_rows import RigidRows
 from warp_mca.model.assembly import GROUND
 from warp_mca.physics.actor import Actor, When
+from warp_mca.physics.rigid.joint_arrays import JointArrays, JointState
 from warp_mca.step.stage import BESIDE, Stage, Step
 from warp_mca.step.threads import NODES, Split, whole
 
@@ -44,6 +45,7 @@ class RigidState:
         spin: angular momentum of each body about its mass centre then [kg m^2/s], shape (body_count,), vec3d.
         orientation: rotation of the cluster of each pin in `Model.rigid_pins` since the start [-], shape (pin_count,),
             quatd.
+        joints: of joints between whole bodies, `JointState`; None without.
     """
 
     centre: wp.array
@@ -51,6 +53,7 @@ class RigidState:
     momentum: wp.array
     spin: wp.array
     orientation: wp.array
+    joints: JointState | None = None
 
 
 def groups_of(bodies: Sequence[RigidBody], rows: Sequence[RigidRow]) -> list[list[int]]:
@@ -74,10 +77,10 @@ class RigidStage(Actor):
         self.lanes = BLOCK if wp.get_device().is_cuda else 1
         if not self.count:
             return
-        self.kernel = rigid_body.advance_kernel(nodes.kind)
+        self.kernel = rigid_body.advance_kernel(nodes.kind, bool(model.body_joints))
         self.own = own = model.rigid_bodies
         self._make_bodies(model, own)
-        self._make_rows(own, model.rigid_rows)
+        self._make_rows(solver, own, model.rigid_rows)
         self._make_pins(model.rigid_pins, nodes.constraints)
         self._make_outputs()
         moved = [body.nodes for body in own]
@@ -103,7 +106,7 @@ class RigidStage(Actor):
         found.sign = wp.array(np.concatenate(signs), dtype=wp.float64)
         self.bodies = found
 
-    def _make_rows(self, own: Sequence[RigidBody], unsorted: Sequence[RigidRow]) -> None:
+    def _make_rows(self, solver: Solver, own: Sequence[RigidBody], unsorted: Sequence[RigidRow]) -> None:
         groups = groups_of(own, unsorted)
         self.groups = len(groups)
         self.group_of = group_of = {k: g for g, group in enumerate(groups) for k in group}
@@ -131,6 +134,16 @@ class RigidStage(Actor):
         found.pin = wp.array([place[row.pin] for row in rows], dtype=wp.int32)
         of_groups = np.array([group_of[pin.body] for pin in pins], dtype=np.int64)
         found.pins = wp.array(offsets(np.bincount(of_groups, minlength=len(groups)).tolist()), dtype=wp.int32)
+        found.joint = wp.array([row.joint for row in rows], dtype=wp.int32)
+        self.joints: JointArrays | None = None
+        if items := self.model.body_joints:
+            of_joints = [group_of[max(item.body, item.other) if item.soft else item.body] for item in items]
+            places = [place[p] for p in range(len(pins))]
+            self.joints = JointArrays(solver, items, of_joints, rows, places, len(groups))
+            found.joints = self.joints.joints
+            first = self.joints.rates
+            rates = [first[row.joint] + row.rate if row.rate >= 0 else -1 for row in rows]
+            found.rate = wp.array(rates, dtype=wp.int32)
         self.rows, self.entries = found, int((count**2).sum())
 
     def _make_pins(self, pins: Sequence[RigidPin], constraints: ConstraintStage) -> None:
@@ -157,17 +170,21 @@ class RigidStage(Actor):
         step.gap, step.value, step.matrix = (wp.zeros(n, dtype=wp.float64) for n in (size, size, self.entries))
         step.mean, step.impulse = wp.zeros(pins, dtype=Mean), wp.zeros((pins, 2), dtype=wp.vec3d)
         step.point, step.place, step.axis = (wp.zeros(pins, dtype=wp.vec3d) for _ in range(3))
+        if self.joints:
+            step.joints = self.joints.step
 
     def new_state(self) -> RigidState:
         """State before `start`, on the current device."""
         at_rest, pins = ([(0.0, 0.0, 0.0, 1.0)] * n for n in (self.count, len(self.model.rigid_pins)))
         vectors = {name: wp.zeros(self.count, dtype=wp.vec3d) for name in ("centre", "momentum", "spin")}
         turns = {"rotation": wp.array(at_rest, dtype=wp.quatd), "orientation": wp.array(pins, dtype=wp.quatd)}
-        return RigidState(**turns, **vectors)
+        joints = self.joints.new_state() if self.count and self.joints else None
+        return RigidState(**turns, **vectors, joints=joints)
 
     def record_kernels(self) -> list[Any]:
         """Those of a step, which have blocks of Warp's own size."""
-        return [self.kernel, rigid_body.follow] if self.count else []
+        found = [self.kernel, rigid_body.follow] if self.count else []
+        return found + (self.joints.record_kernels() if self.count and self.joints else [])
 
     def start(self, state: State) -> None:
         """Take pose and momentum from the nodes, and the velocities half a step back, from t = 0 to t = -dt / 2."""
@@ -186,6 +203,8 @@ class RigidStage(Actor):
         """Rigid bodies and their nodes."""
         if when.common and self.count:
             yield Stage("advance", "rigid bodies", lambda s: self._step(s, when.level), BESIDE)
+        if self.count and self.joints:
+            yield self.joints.stage()
 
     def _step(self, step: Step, level: int | None) -> None:
         """All rigid bodies and their nodes, with forces of elements up to a level, or of all."""
@@ -199,6 +218,8 @@ class RigidStage(Actor):
         poses = Poses()
         poses.centre, poses.rotation, poses.momentum = own.centre, own.rotation, own.momentum
         poses.spin, poses.orientation = own.spin, own.orientation
+        if self.joints:
+            poses.joints = self.joints.poses(state)
         outputs, threads = [self.nodes.moved(state), poses, state.constraints.impulse], (self.groups, self.lanes)
         wp.launch(self.kernel, threads, inputs=inputs, outputs=[*outputs, self.step], block_dim=BLOCK)
 
