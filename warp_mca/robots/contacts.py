@@ -137,10 +137,10 @@ class Contacts:
 
     def _mesh(self, geom: int) -> Mesh:
         mj, name = self._machine.mj, self._sets[geom]
-        points, faces = geom_surface(mj, self._machine, geom, name, AROUND)
+        surface = geom_surface(mj, self._machine, geom, name, AROUND)
         for point in self._touched.get(geom, ()):
-            points = with_node(mj, self._machine, geom, points, point)
-        return filled(name, (points, faces), name)
+            surface = with_node(mj, self._machine, geom, surface, point, AROUND)
+        return filled(name, surface, name)
 
     def beside(self) -> list[Body]:
         """Bodies of geoms of the world that may be touched, and bodies beside the machine that have moved on."""

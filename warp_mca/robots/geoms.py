@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from warp_mca.robots.touching import Side
 
 AROUND = 48  # faces around a round geom, which then lies at most 0.2 % of its radius inside
+NEAR = 0.9  # of the distance of the nodes around a round geom, within which one is near another
 ON_RIM = 1e-6  # share of a radius within which a point lies on the rim of a cylinder
 MOST_RINGS = 64  # of nodes along the side of a capsule, which are a radius apart
 _BOX = np.array([list(map(int, face)) for face in "032 021 456 467 015 054 126 165 237 276 304 347".split()], np.int32)
@@ -88,19 +89,38 @@ def _turned(outline: Array, around: int) -> tuple[Array, Index]:
     return points, np.concatenate(faces).astype(np.int32)
 
 
-def with_node(mj: Any, machine: Machine, geom: int, points: Array, point: Array) -> Array:
-    """The nodes of a round geom with the nearest one moved to a point of its surface where it touches [m].
+def with_node(
+    mj: Any, machine: Machine, geom: int, surface: tuple[Array, Index], point: Array, around: int
+) -> tuple[Array, Index]:
+    """The surface of a round geom with a node where it touches [m], in place of all nodes that are near.
 
-    Those of boxes and meshes stay: they touch with a corner, or are touched on a face.
+    Nodes are near up to the distance of those around the geom, so that one alone touches first. Surfaces of boxes and
+    meshes stay: they touch with a corner, or are touched on a face.
     """
     kinds = [int(getattr(mj.mjtGeom, f"mjGEOM_{key}")) for key in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER")]
-    kind, radius = int(machine.model.geom_type[geom]), float(machine.model.geom_size[geom, 0])
-    rim = math.hypot(point[0], point[1]) > (1.0 - ON_RIM) * radius
+    kind, sizes = int(machine.model.geom_type[geom]), machine.model.geom_size[geom]
+    rim = math.hypot(point[0], point[1]) > (1.0 - ON_RIM) * float(sizes[0])
     if kind not in kinds or (kind == kinds[3] and not rim):
-        return points
-    moved = points.copy()
-    moved[np.linalg.norm(points - point, axis=1).argmin()] = point
-    return moved
+        return surface
+    radius = float(sizes.min()) if kind == kinds[2] else float(sizes[0])
+    points = surface[0]
+    away = np.linalg.norm(points - point, axis=1)
+    return hull(np.vstack([points[away > NEAR * 2.0 * np.pi * radius / around], point]))
+
+
+def hull(points: Array) -> tuple[Array, Index]:
+    """The surface of the convex hull of points [m], its triangles counterclockwise from outside."""
+    from scipy.spatial import ConvexHull
+
+    found = ConvexHull(points)
+    faces = found.simplices.astype(np.int32)
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), found.equations[:, :3]) < 0.0
+    faces[inward] = faces[inward][:, ::-1]
+    used = np.unique(faces)
+    place = np.zeros(len(points), dtype=np.int32)
+    place[used] = np.arange(len(used))
+    return points[used], place[faces]
 
 
 def filled(name: str, surface: tuple[Array, Index], node_set: str) -> Mesh:
