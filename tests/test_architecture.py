@@ -24,6 +24,7 @@ from warp_mca.physics.floating.stage import FloatingState
 from warp_mca.physics.joints.constraint_stage import ConstraintState
 from warp_mca.physics.joints.coupling_stage import CouplingState
 from warp_mca.physics.loads.stage import LoadState
+from warp_mca.physics.rigid.joint_arrays import JointState
 from warp_mca.physics.rigid.stage import RigidState
 from warp_mca.step.solver import Solver
 from warp_mca.step.state import State
@@ -100,7 +101,7 @@ def test_functions_that_the_page_names_exist():
 
 
 def everything() -> mca.Scene:
-    """A scene with each kind of thing that acts: contact, hinge, rail, driven node, absorbing side, tie, rigid body."""
+    """A scene with each kind of thing that acts: contact, hinge, rail, driven node, absorbing side, tie, rigid joint."""
     rail = mca.Box(size=(0.1, 0.02, 0.01), divisions=(10, 4, 2), origin=(0.0, -0.01, -0.01))
     cart = mca.Box(size=(0.02, 0.01, 0.01), divisions=(2, 2, 2), origin=(0.01, -0.005, 0.0))
     wall = mca.RigidPlane(point=(0.04, 0.0, 0.0), normal=(-1.0, 0.0, 0.0))
@@ -124,7 +125,11 @@ def everything() -> mca.Scene:
                 ("rigid", 0.3),
             )
         ),
-        joints=(mca.Prismatic(name="P", **on_rail), mca.Weld(name="W", body="rail", nodes="zmin")),
+        joints=(
+            mca.Prismatic(name="P", **on_rail),
+            mca.Weld(name="W", body="rail", nodes="zmin"),
+            mca.Cylindrical(name="C", body="rigid", axis=(1.0, 0.0, 0.0)),
+        ),
         prescribed=(mca.Prescribed(body="driven", nodes="xmax", axis="x", times=(0.0,), velocities=(0.0,)),),
         absorbing=(mca.Absorbing(body="carrier", nodes="zmax"),),
         contacts=(mca.Contact(slave=mca.Surface(body="cart", nodes="zmax"), master=wall),),
@@ -166,6 +171,7 @@ STATE_PARTS = {
     "loads/": LoadState,
     "absorbing/": AbsorbingState,
     "rigid/": RigidState,
+    "rigid/joints/": JointState,
     "floating/": FloatingState,
 }
 

@@ -38,6 +38,7 @@ class RigidJoints:
         motor: NO_MOTOR, TORQUE or SERVO, of each rate, shape (rate_count,), int32.
         drive: its columns as above, shape (rate_count, COLUMNS), float64.
         tables: torques or targets of each rate.
+        rounding: opening that rounding leaves [m].
     """
 
     begin: wp.array(dtype=wp.int32)
@@ -60,6 +61,7 @@ class RigidJoints:
     motor: wp.array(dtype=wp.int32)
     drive: wp.array2d(dtype=wp.float64)
     tables: Tables
+    rounding: wp.float64
 
 
 @wp.struct

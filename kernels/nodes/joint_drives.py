@@ -63,7 +63,9 @@ def friction_factor(e: int, rate: wp.float64, joints: RigidJoints) -> wp.float64
 
 
 @wp.func
-def drive(e: int, clock: int, dt: wp.float64, moves: bool, joints: RigidJoints, state: JointPoses, step_out: JointStep):
+def drive_rate(
+    e: int, clock: int, dt: wp.float64, moves: bool, joints: RigidJoints, state: JointPoses, step_out: JointStep
+):
     """Torque and viscous factor of the motor of a rate at t(n)."""
     step_out.torque[e] = wp.float64(0.0)
     step_out.hold[e] = wp.float64(0.0)
@@ -103,7 +105,7 @@ def push_joint(
             x = q - joints.drive[e, wp.static(REST)]
             over = beyond(e, q, joints)
             k_over = joints.drive[e, wp.static(LIMIT_STIFFNESS)]
-            drive(e, state.clock[j], dt, moves, joints, state, step_out)
+            drive_rate(e, state.clock[j], dt, moves, joints, state, step_out)
             drag = joints.drive[e, wp.static(DAMPING)] + friction_factor(e, rate, joints)
             if over != wp.float64(0.0):
                 drag += joints.drive[e, wp.static(LIMIT_DAMPING)]

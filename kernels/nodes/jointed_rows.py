@@ -106,7 +106,7 @@ def satisfy_joints(
             step_out.joints.worst[k] = opening(begin, end, span, counts, rows, clusters, poses_out, step_out)
         wait_for_block()
         worst = step_out.joints.worst[k]
-        if worst == wp.float64(0.0) or (step > 0 and worst >= best):
+        if wp.abs(span) * worst <= rows.joints.rounding or (step > 0 and worst >= best):
             break
         best = worst
         if lane == 0:

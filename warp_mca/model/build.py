@@ -108,7 +108,7 @@ def build_model(
     added[absorbing.node] += absorbing.eigenvalues(parts.mass)
     loads = loaded_nodes(parts, start, added, grouping is not None)
     rigid = rigid_bodies(parts, pairs, joints, couplings, passes, loads, velocity)
-    check_ties(ties, held, [nodes_of(pairs), absorbing.node, *(body.nodes for body in rigid.bodies)])
+    check_ties(ties, held, [nodes_of(pairs), absorbing.node, *(body.nodes for body in rigid.rigid_bodies)])
     added, parts.relief = ties.shared(added, parts.mass), ties.relief(parts.mass)
     found: dict[str, Any] = {**_bodies(parts, watched), **held, **pairs}
     found |= _steps(parts, rigid, added, velocity, passes, loads)
@@ -126,10 +126,7 @@ def build_model(
         passes=passes,
         contact_axes=axes,
         penalties=penalties,
-        rigid_bodies=rigid.bodies,
-        rigid_rows=rigid.rows,
-        rigid_pins=rigid.pins,
-        body_joints=rigid.joints,
+        **rigid._asdict(),
     )
     return grouping(model, OwnSteps(parts, added, share_of_step(parts, velocity))) if grouping else model
 
@@ -162,7 +159,7 @@ def _steps(
     loads: Mapping[str, Sequence[LoadedNodes]],
 ) -> dict[str, Any]:
     """Stable step and mass scaling, by the name of the attribute; mass scaling raises the masses of the assembly."""
-    plain = stable_with_rigid(parts, rigid, added, velocity) if rigid.bodies else parts.stable(added)
+    plain = stable_with_rigid(parts, rigid, added, velocity) if rigid.rigid_bodies else parts.stable(added)
     stable, scaling = scale_masses(parts, added, plain)
     decay = sum(item.decay for item in passes) + greatest_decay(loads, parts.mass)
     stable = with_damping(with_viscosity(stable, parts, velocity, decay), parts, loads, added, decay)

@@ -15,6 +15,7 @@ from warp_mca.phases.rate_groups import rate_figures
 from warp_mca.physics.contact.bonds import bond_reports
 from warp_mca.physics.elements.cells import body_materials
 from warp_mca.results.contact_history import contact_names
+from warp_mca.results.joint_report import joint_reports
 from warp_mca.results.result import Result, summarise
 from warp_mca.results.sensor_history import sensor_figures
 from warp_mca.step.state_figures import (
@@ -144,6 +145,15 @@ class SceneRun:
         """Steps that its rows cover [-], fewer than asked where it ended early."""
         return self.steps.per_interval * max(self.ledger.kept.count - 1, 0)
 
+    def _rigid_facts(self) -> dict[str, Any]:
+        """What a summary says of rigid bodies and of joints between whole bodies."""
+        of_scene, found = (self.solver, self.state, self.index), {}
+        if self.ready.scene.rigid_names:
+            found["rigid_bodies"] = rigid_bodies(*of_scene)
+        if self.ready.model.body_joints:
+            found["joints"] = joint_reports(*of_scene, history_columns(self.ledger))
+        return found
+
     def _facts(self, wall: Mapping[str, float], shares: Mapping[str, SpringShare | None]) -> dict[str, Any]:
         scene, start, model, ledger = self.ready.scene, self.ready.start, self.ready.model, self.ledger
         count = self.step_count
@@ -158,8 +168,7 @@ class SceneRun:
             **self._solver_facts(),
             "refine": scene.refine,
         }
-        if scene.rigid_names:
-            more["rigid_bodies"] = rigid_bodies(self.solver, self.state, self.index)
+        more |= self._rigid_facts()
         if model.rates:
             more |= rate_figures(model.rates, self.steps.dt, count, wall)
         if self.solver.layout.count > 1:

@@ -129,12 +129,19 @@ class Cylindrical(WholeJoint):
 
 
 def check_whole(scene: Scene) -> None:
-    """Refuse joints of whole bodies that cannot be.
+    """Refuse joints of whole bodies that cannot be, and contact of bodies without geometry.
 
     Raises:
-        RequestError: both bodies are flexible, a flexible one has no node set, a rigid one has, or the scene swings.
+        RequestError: both bodies are flexible, a flexible one has no node set, a rigid one has, the scene swings, or
+            such a body is in contact.
     """
     rigid = set(scene.rigid_names)
+    bare = {body.name for body in scene.bodies if body.is_inertia}
+    for contact in scene.listed:
+        for name in ("slave", "master"):
+            body = getattr(getattr(contact, name), "body", None)
+            if body in bare:
+                raise bad_value(f"Contact.{name}.body", body, "it is a mass without surface; give it a geometry")
     for joint in scene.joints:
         whole = joint.whole()
         if whole is None:

@@ -75,9 +75,11 @@ class Watch:
         self._skins = [
             Skin(b.name, faces.get(b.name, meshes[b.name].boundary[0]), model.X, model.node_start[b.name])
             for b in scene.bodies
+            if not b.is_inertia
         ]
         self.cases = list(cases_of(scene, meshes, model, self._skins))
-        self.nodes = np.concatenate([skin.nodes for skin in self._skins])[: None if self.cases else 0]
+        nodes = np.concatenate([np.zeros(0, np.int32), *(skin.nodes for skin in self._skins)])
+        self.nodes = nodes[: None if self.cases else 0]
 
     def look(self, x: Array, speed: float, pressed: Array, time: float, passed: Array) -> tuple[Array, int]:
         """What has been seen, with bodies as they are now, and how many steps may pass between two looks.

@@ -196,9 +196,12 @@ def cases_of(scene: Scene, meshes: Mapping[str, Mesh], model: Model, skins: Sequ
         if not kept_out.all():
             yield BelowPlane((skin,), own, kept_out, plane)
     bound = _bound_nodes(scene, meshes, model)
+    whole = {frozenset((joint.body, joint.other)) for joint in scene.joints if joint.whole()}
     for numbers in combinations(range(len(skins)), 2):
         one, other = (skins[k] for k in numbers)
         names = frozenset((one.name, other.name))
+        if names in whole:  # links overlap at their joint
+            continue
         edges = _free_edges(one, other, [model.X[nodes] for nodes in bound.get(names, ())])
         yield WithinBody((one, other), passes.get(names, ()), numbers, edges)
     for k, skin in enumerate(skins):

@@ -18,7 +18,8 @@ from warp_mca.physics.joints.constraints import JointPairs
 from warp_mca.physics.joints.couplings import Coupling
 from warp_mca.physics.loads.joint_loads import MovableBase
 from warp_mca.physics.loads.nodal import LoadedNodes
-from warp_mca.physics.rigid.body_joints import BodyJoint, join_whole
+from warp_mca.physics.rigid.body_joints import BodyJoint
+from warp_mca.physics.rigid.joining import join_whole
 from warp_mca.physics.rigid.rows import RigidPin, RigidRow, check_joint, fixed_rows, joint_rows, pin_of, pin_rows
 from warp_mca.scene import Scene
 
@@ -70,10 +71,10 @@ class RigidBody:
 class Rigid(NamedTuple):
     """Rigid bodies of a scene, rows, pins and joints, as `Model` has them."""
 
-    bodies: tuple[RigidBody, ...] = ()
-    rows: tuple[RigidRow, ...] = ()
-    pins: tuple[RigidPin, ...] = ()
-    joints: tuple[BodyJoint, ...] = ()
+    rigid_bodies: tuple[RigidBody, ...] = ()
+    rigid_rows: tuple[RigidRow, ...] = ()
+    rigid_pins: tuple[RigidPin, ...] = ()
+    body_joints: tuple[BodyJoint, ...] = ()
 
 
 def own_nodes(parts: Assembly) -> dict[str, Index]:

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from warp_mca.step.state import State
 
 
+ROUNDING = 1e-15  # opening that counts as closed, over the greatest arm of a joint: a few units of float64
+
+
 @dataclass(eq=False)
 class JointState:
     """State of joints between whole bodies, those of `Model.body_joints` and their rates in turn.
@@ -117,6 +120,8 @@ class JointArrays:
         tables = [table for item in items for table in item.tables]
         if tables:
             found.tables = tables_of([_Table(np.array(table.times), np.array(table.values)) for table in tables])
+        reach = [np.linalg.norm(arm, axis=1).max() for arm in (found.arm.numpy(), found.other_arm.numpy())]
+        found.rounding = ROUNDING * float(max(*reach, max(item.length for item in items)))
         self.joints = found
 
     def _make_step(self, rows: int, groups: int) -> None:

@@ -44,7 +44,7 @@ def stable_with_rigid(parts: Assembly, rigid: Rigid, added: Array, velocity: Arr
     Raises:
         RequestError: as in `stable_step.stable_step`.
     """
-    bodies = rigid.bodies
+    bodies = rigid.rigid_bodies
     own = np.concatenate([body.own for body in bodies])
     others = added.copy()
     others[own] = 0.0
@@ -72,15 +72,15 @@ def _stiffest(rigid: Rigid) -> tuple[float, int]:
 
     Springs of limits count WHOLE times. What joints hold moves less, and rotors make it slower.
     """
-    count = 6 * len(rigid.bodies)
+    count = 6 * len(rigid.rigid_bodies)
     K, most = np.zeros((count, count)), (0.0, 0)
-    for item in rigid.joints:
+    for item in rigid.body_joints:
         screws, k = item.screws(), item.drive[:, [STIFFNESS, KP]].sum(axis=1) + WHOLE * item.drive[:, LIMIT_STIFFNESS]
         for F, stiffness, A in zip(np.linalg.pinv(screws).T, k, item.drive[:, ARMATURE], strict=True):
             row = np.zeros(count)
             for b, sign in ((item.body, 1.0), (item.other, -1.0)):
                 if b != GROUND and stiffness > 0.0:
-                    body = rigid.bodies[b]
+                    body = rigid.rigid_bodies[b]
                     moment = item.length * F[:3] + np.cross(item.place - body.centre, F[3:])
                     half = np.linalg.cholesky(np.linalg.inv(body.inertia)).T
                     row[6 * b : 6 * b + 6] = sign * np.concatenate([F[3:] / math.sqrt(body.mass), half @ moment])
