@@ -10,8 +10,8 @@ import pytest
 import warp_mca as mca
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.cli.main import main
-from warp_mca.robots.geoms import filled, geom_surface
-from warp_mca.verify.machines import ARM, STOP, robot
+from warp_mca.robots.geoms import filled, geom_surface, hull
+from warp_mca.verify.machines import ARM, STOP, robot, write_stl
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -211,6 +211,67 @@ def test_geoms_are_closed_surfaces_of_their_volume(size):
     volume = np.linalg.det(corners[:, 1:] - corners[:, :1]).sum() / 6.0
     assert volume == pytest.approx(exact, rel=3e-3)
     assert len(mesh.boundary[0]) == len(mesh.tetrahedra)
+
+
+def urdf_of_arm():
+    """The arm as a URDF without drives, table and start; the surface of its tool is an STL file."""
+    model = mujoco.MjModel.from_xml_string(ARM)
+    tool = model.body("tool").id
+    links = ['<link name="world"/>']
+    for k in range(1, model.nbody):
+        x, y, z = model.body_ipos[k]
+        a, b, c = model.body_inertia[k]
+        mesh = '<collision><geometry><mesh filename="tool.stl"/></geometry></collision>' if k == tool else ""
+        links.append(
+            f'<link name="{model.body(k).name}"><inertial><origin xyz="{x} {y} {z}"/>'
+            f'<mass value="{model.body_mass[k]}"/>'
+            f'<inertia ixx="{a}" iyy="{b}" izz="{c}" ixy="0" ixz="0" iyz="0"/></inertial>{mesh}</link>'
+        )
+        x, y, z = model.body_pos[k]
+        parent = model.body(model.body_parentid[k]).name
+        ends = f'<parent link="{parent}"/><child link="{model.body(k).name}"/><origin xyz="{x} {y} {z}"/>'
+        if model.body_jntnum[k]:
+            j = int(model.body_jntadr[k])
+            u, v, w = model.jnt_axis[j]
+            low, high = model.jnt_range[j] if model.jnt_limited[j] else (-9.0, 9.0)
+            links.append(
+                f'<joint name="{model.joint(j).name}" type="revolute">{ends}<axis xyz="{u} {v} {w}"/>'
+                f'<limit lower="{low}" upper="{high}" effort="0" velocity="0"/>'
+                f'<dynamics damping="{model.dof_damping[j]}"/></joint>'
+            )
+        else:
+            links.append(f'<joint name="bolt" type="fixed">{ends}</joint>')
+    return "<robot name='arm'>" + "".join(links) + "</robot>"
+
+
+def test_the_arm_from_a_urdf_with_a_mesh_strikes_alike(tmp_path):
+    """Servos, start and table are given in Python; the surface of the tool has a node where the capsule touches."""
+    model = mujoco.MjModel.from_xml_string(ARM)
+    text = urdf_of_arm()
+    machine = robot(ARM, tmp_path, keyframe="strike")
+    swing = machine.swing()
+    whole = machine.strike(impact=IMPACT, swing=swing).body("tool")
+    points = whole.geometry.points[:-1]
+    lowest = (points @ rotation_matrix(whole.rotation).T)[:, 2].argmin()
+    points, faces = hull(np.vstack([points[::5], points[lowest]]))
+    write_stl(tmp_path / "tool.stl", points[faces])
+    servos = {}
+    for k in range(6):
+        kp, kv = model.actuator_gainprm[k, 0], -model.actuator_biasprm[k, 2]
+        target, limits = model.key_ctrl[0][k], tuple(model.actuator_forcerange[k])
+        servos[f"j{k + 1}"] = mca.PositionServo(kp=kp, kv=kv, target=target, limits=limits)
+    table = mca.Box(size=(0.5, 0.5, 0.04), divisions=(1, 1, 1), origin=(0.2, -0.25, 0.0))
+    top = mca.Body(name="top", geometry=table, material=STEEL, rigid=True)
+    start = {"qpos": tuple(model.key_qpos[0]), "qvel": tuple(model.key_qvel[0])}
+    struck = robot(text, tmp_path, "arm.urdf", servos=servos, against=(top,), touch=("tool",), **start)
+    found = struck.swing()
+    assert found.t_end == pytest.approx(swing.t_end, abs=1e-6)
+    assert found.touch.velocity == pytest.approx(swing.touch.velocity, rel=1e-4)
+    assert found.touch.effective_mass == pytest.approx(swing.touch.effective_mass, rel=1e-4)
+    held = (mca.Fixed(body="top", nodes="boundary"),)
+    scene = struck.strike(impact=replace(IMPACT, duration=4.2e-4), swing=found, fixed=held)
+    result = mca.run(scene, precision="float64")
+    assert 1e-6 * result.F_n.sum() == pytest.approx(3.39, rel=0.005)
 
 
 def test_command_prints_a_scene_file_that_strikes(tmp_path, capsys):

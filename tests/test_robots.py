@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import struct
 import sys
 
 import numpy as np
@@ -11,10 +10,9 @@ import pytest
 
 import warp_mca as mca
 from warp_mca.base.errors import RequestError
-from warp_mca.robots.geoms import geom_surface
 from warp_mca.robots.machine import Machine
 from warp_mca.robots.skins import Skin, closest_points
-from warp_mca.verify.machines import ARM, FOUR_BAR, STOP, robot
+from warp_mca.verify.machines import ARM, FOUR_BAR, STOP, robot, write_stl
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -35,26 +33,6 @@ URDF = f"""<robot name="stand">
     <origin xyz="0 0 0.6"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="10" velocity="1"/></joint>
   <joint name="bolt" type="fixed"><parent link="mast"/><child link="head"/><origin xyz="0 0 0.1"/></joint>
 </robot>"""
-
-
-class Servo:
-    """A position servo, as a scene gives it."""
-
-    def __init__(self, kp, kv, target, limits=None):
-        self.kp, self.kv, self.target, self.limits = kp, kv, target, limits
-
-
-def write_stl(path, half):
-    """A box as a binary STL file."""
-    model = mujoco.MjModel.from_xml_string(
-        f'<mujoco><worldbody><geom type="box" size="{half} {half} {half}"/></worldbody></mujoco>'
-    )
-    machine = type("M", (), {"model": model})
-    points, faces = geom_surface(mujoco, machine, 0, "box")  # type: ignore[arg-type]
-    with path.open("wb") as file:
-        file.write(bytes(80) + struct.pack("<I", len(faces)))
-        for face in faces:
-            file.write(struct.pack("<12fH", 0, 0, 0, *points[face].reshape(-1), 0))
 
 
 def ball(tmp_path, kind="sphere", size="0.1", **more):
@@ -135,8 +113,9 @@ def test_urdf_keeps_its_fixed_links_and_takes_servos_start_and_meshes_from_pytho
     """A head of STL falls with its mast on a servo; z'' = -g - (kp z + kv z') / 3."""
     from scipy.integrate import solve_ivp
 
-    write_stl(tmp_path / "box.stl", 0.05)
-    servo = Servo(kp=30.0, kv=6.0, target=-0.2, limits=(-8.0, 8.0))
+    box = mca.Box(size=(0.1, 0.1, 0.1), divisions=(1, 1, 1), origin=(-0.05, -0.05, -0.05))
+    write_stl(tmp_path / "box.stl", Skin.of(box.build()).triangles)
+    servo = mca.PositionServo(kp=30.0, kv=6.0, target=-0.2, limits=(-8.0, 8.0))
     machine = robot(URDF, tmp_path, "stand.urdf", servos={"lift": servo}, qvel={"lift": -0.5}, against=(FLOOR,))
     assert Machine(machine).names.bodies == ["base", "mast", "head"]
 
@@ -211,7 +190,7 @@ def test_what_a_machine_does_not_carry_is_refused_by_name(tmp_path, text, what):
         ({"qvel": (1.0, 2.0)}, "Robot.qvel"),
         ({"qpos": {"hinge": 0.6}}, "start within its limits, -1 to 0.5"),
         ({"ctrl": {"drive": 1.0}}, "the file's actuators are none"),
-        ({"servos": {"elbow": Servo(1.0, 0.0, 0.0)}}, "Robot.servos = 'elbow'"),
+        ({"servos": {"elbow": mca.PositionServo(kp=1.0)}}, "Robot.servos = 'elbow'"),
         (
             {"flexible": {"leg": mca.Body(name="leg", geometry=mca.Rod(radius=0.01, length=0.1), material=STEEL)}},
             "wheel",

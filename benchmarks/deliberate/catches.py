@@ -83,6 +83,7 @@ CATCHES: dict[str, tuple[str, ...]] = {
     "rigid_pendulum_period": ("rigid_gravity_halved",),
     "rigid_double_pendulum": ("row_forgets_second", "rigid_gravity_halved"),
     "rigid_ball": ("reaction_halved", "contact_soft"),
+    "arm_strike": ("drives_let_go",),
     "arm_touch": ("touch_at_the_end_of_the_step",),
     "four_bar": ("loop_forgets_turning",),
     "limit_stop": ("limit_without_damping",),

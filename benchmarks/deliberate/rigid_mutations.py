@@ -47,4 +47,10 @@ RIGID_MUTATIONS: dict[str, Mutation] = {
         "self.times.append(solver.t if touch is None else touch[0])",
         "self.times.append(solver.t)",
     ),
+    "drives_let_go": Mutation(
+        "drives of a machine do not act during an impact",
+        "warp_mca/robots/drives.py",
+        "if machine.passive or not drives:",
+        "if True or not drives:",
+    ),
 }

@@ -16,7 +16,7 @@ from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.scene import Body, ImpactPhase, RigidPlane, Scene
+from warp_mca.scene import Body, Fixed, ImpactPhase, PositionServo, RigidPlane, Scene
 from warp_mca.scene.materials import Material
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ class Robot:
         qpos: start in place of the file's: all of MuJoCo's coordinates, or some by the name of their joint [m, rad].
         qvel: likewise rates [m/s, rad/s].
         ctrl: likewise controls, by the name of the actuator.
-        servos: position servos by joint that the file does not have, as a URDF; each has kp, kv, target and limits.
+        servos: by joint, where the file has no drive, as a URDF.
         controller: gives the controls at time t [s], coordinates and rates: controller(t, qpos, qvel). It is called at
             each period, and its controls are held in between.
         period: of the controller [s].
@@ -65,7 +65,7 @@ class Robot:
     qpos: Values | None = None
     qvel: Values | None = None
     ctrl: Values | None = None
-    servos: Mapping[str, Any] = field(default_factory=dict)
+    servos: Mapping[str, PositionServo] = field(default_factory=dict)
     controller: Controller | None = None
     period: float | None = None
     mounts: Mapping[str, Any] = field(default_factory=dict)
@@ -76,7 +76,11 @@ class Robot:
         validate.kinds("Robot", (str, os.PathLike), "give the path of a file", path=self.path)
         object.__setattr__(self, "path", os.fspath(self.path))
         validate.kinds("Robot", Mapping, "give a Body for each link by its name", flexible=self.flexible)
-        validate.kinds("Robot", Mapping, "give a servo for each joint by its name", servos=self.servos)
+        validate.kinds("Robot", Mapping, "give a PositionServo for each joint by its name", servos=self.servos)
+        for name, servo in self.servos.items():
+            validate.kind_of(f"Robot.servos[{name!r}]", servo, PositionServo, "give a PositionServo")
+            if not validate.is_number(servo.target):
+                raise bad_value(f"Robot.servos[{name!r}].target", "Amplitude", "give a number, or a controller")
         object.__setattr__(self, "flexible", {name: self._body(name, item) for name, item in self.flexible.items()})
         validate.kinds("Robot", (str, NoneType), "give the name of a keyframe", keyframe=self.keyframe)
         validate.members("Robot", (RigidPlane, Body), against=self.against)
@@ -150,6 +154,7 @@ class Robot:
         stiffness: float = 1e8,
         mu: float = 0.0,
         swing: RobotSwing | None = None,
+        fixed: tuple[Fixed, ...] = (),
         name: str = "strike",
     ) -> Scene:
         """The machine at its first touch as a scene, to run, to save or to change: an impact by finite elements.
@@ -166,6 +171,7 @@ class Robot:
             stiffness: of contact between rigid surfaces, of each node [N/m]; others have the default of `Contact`.
             mu: coefficient of friction of all contacts [-]; that of the file is not read.
             swing: how it came there; None: its swing to the first touch.
+            fixed: nodes of bodies beside the machine that are held.
             name: of the scene.
 
         Raises:
@@ -181,7 +187,8 @@ class Robot:
             raise bad_value("Robot.period", self.period, remedy)
         found = self.swing() if swing is None else swing
         machine = self._machine()
-        return HandOff(self, machine, found).scene(impact, self._pairs(machine), stiffness, mu, name)
+        scene = HandOff(self, machine, found).scene(impact, self._pairs(machine), stiffness, mu, name)
+        return replace(scene, fixed=(*scene.fixed, *fixed))
 
     def mount(self, link: str, other: str | None) -> str:
         """Node set by which a flexible link is held to another link, or to what rides on it.

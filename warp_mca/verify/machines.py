@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from warp_mca.base.arrays import Array
 from warp_mca.robots.robot import Robot
 
 # A six-axis arm whose wrist axes meet in a point; position servos; a steel bar as its tool; it strikes a table.
@@ -110,6 +112,14 @@ def robot(text: str, folder: str | Path, name: str = "machine.xml", **more: Any)
     path = Path(folder) / name
     path.write_text(text, encoding="utf-8")
     return Robot(path, **more)
+
+
+def write_stl(path: Path, triangles: Array) -> None:
+    """Write a surface as a binary STL file; corners [m], shape (triangle_count, 3, 3)."""
+    with path.open("wb") as file:
+        file.write(bytes(80) + struct.pack("<I", len(triangles)))
+        for corners in triangles:
+            file.write(struct.pack("<12fH", 0.0, 0.0, 0.0, *corners.reshape(-1), 0))
 
 
 def swung(text: str, *, t_end: float | None = None, **more: Any) -> Any:

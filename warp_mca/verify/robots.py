@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+import warp_mca as mca
 from warp_mca.verify.case import Row, Setup, case
-from warp_mca.verify.machines import ARM, DISC, FOUR_BAR, STOP, swung
+from warp_mca.verify.machines import ARM, DISC, FOUR_BAR, STOP, robot, swung
 
 RATE = 3.0  # of the wheel and the crank at the start [rad/s]
 TOLERANCE = "error control of the swing, or the step of the other code"
@@ -180,3 +183,72 @@ def free_disc(setup: Setup) -> list[Row]:
         ),
         Row("error of the place", 0.0, (way,), "m", 1e-12, "round-off", scale=0.5),
     ]
+
+
+TIP = ARM.replace('type="capsule" fromto="0 0 0.008 0 0 0.152"', 'type="sphere" pos="0 0 0.152"')
+
+
+def _impact(duration: float) -> mca.ImpactPhase:
+    return mca.ImpactPhase(duration=duration, output_interval=1e-6)
+
+
+def _impulse(result: mca.Result) -> float:
+    """Of the contact [N s]; forces are means over intervals of 1 µs."""
+    return 1e-6 * float(result.F_n.sum())
+
+
+def _bounced(stiffness: float, step: float, duration: float) -> float:
+    """Impulse on the arm's tip [N s] by MuJoCo alone, whose ball a spring presses off the table, from the touch on."""
+    import mujoco
+
+    library: Any = mujoco
+    found = swung(TIP, keyframe="strike")
+    model = library.MjModel.from_xml_string(TIP)
+    model.opt.timestep, model.opt.integrator = step, int(library.mjtIntegrator.mjINT_EULER)
+    for flag in ("CONTACT", "EULERDAMP"):
+        model.opt.disableflags |= int(getattr(library.mjtDisableBit, f"mjDSBL_{flag}"))
+    data, tool = library.MjData(model), model.body("tool").id
+    data.qpos[:], data.qvel[:], data.ctrl[:] = found.qpos, found.qvel, found.ctrl
+    J, impulse = np.zeros((3, model.nv)), 0.0
+    for _ in range(round(duration / step)):
+        library.mj_fwdPosition(model, data)
+        point = data.geom("tool").xpos - (0.0, 0.0, 0.008)
+        force = stiffness * max(0.04 - point[2], 0.0)
+        library.mj_jac(model, data, J, None, point, tool)
+        data.qfrc_applied[:] = force * J[2]
+        impulse += force * step
+        library.mj_step(model, data)
+    return impulse
+
+
+@case(
+    group="rigid",
+    title="A six-axis arm of rigid links strikes a table, and its servos push on",
+    reference="MuJoCo with a spring at the tip; without other forces 2 m v with the effective mass m at the touch.",
+    needs="mujoco",
+    elements=(),
+)
+def arm_strike(setup: Setup) -> list[Row]:
+    """The arm with a ball as its tip, at 1e8 N/m with all forces on; at the full level also at 1e9 N/m without."""
+    with TemporaryDirectory() as folder:
+        arm = robot(TIP, folder, keyframe="strike")
+        found = arm.swing()
+        scene = arm.strike(impact=_impact(4.2e-4), swing=found, stiffness=1e8)
+        bare = arm.strike(impact=_impact(1.3e-4), swing=found, stiffness=1e9)
+    result = mca.run(scene, device=setup.device, precision="float64")
+    exact = _bounced(1e8, 1e-7, 4.2e-4)
+    first = float(result["joint_j2_drive1_Nm"][1])
+    drift = abs(result.summary["energy"]["error"]) / found.kinetic_energy
+    rows = [
+        Row("impulse at 1e8 N/m, all forces on", exact, (_impulse(result),), "N s", 0.005, "24 faces around the tip"),
+        Row("error of the energy", 0.0, (drift,), "-", 3e-3, "second order of the springs", scale=1.0),
+        Row("torque of the servo of j2 at the start", found.drives[1], (first,), "N m", 1e-3, "mean of an interval"),
+    ]
+    if setup.level == "full":
+        free = lambda item: replace(item, motor=None, damping=0.0)  # noqa: E731
+        joints = tuple(replace(j, freedoms=tuple(map(free, j.freedoms))) for j in bare.joints)  # type: ignore[attr-defined]
+        bare = replace(bare, joints=joints, gravity=(0.0, 0.0, 0.0))
+        whole = 2.0 * found.touch.effective_mass * -float(found.touch.velocity @ found.touch.normal)
+        impulse = _impulse(mca.run(bare, device=setup.device, precision="float64"))
+        rows.append(Row("impulse at 1e9 N/m, no other forces", whole, (impulse,), "N s", 0.005, "the spring's time"))
+    return rows
