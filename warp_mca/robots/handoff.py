@@ -127,7 +127,7 @@ class HandOff:
         if any(freedom.kind == "ball" for freedom in freedoms) and len(freedoms) > 1:
             remedy = "a ball beside other joints of one link is not carried; give three hinges, or a link between"
             raise bad_value("Robot: joints of link", self.names.body(link), remedy)
-        name = self.names.joint(first) if count == 1 else f"{self.names.body(link)} joint"
+        name = joint_name(machine, link)
         if nodes is not None:  # the frame of a flexible body is not that of its link
             freedoms, at = self._in_frame(body, link, freedoms)
         else:
@@ -167,6 +167,13 @@ class HandOff:
         at = machine.local(links[0], point)
         freedoms = (Freedom(kind="ball", at=_vec(at)),) if kind == int(mj.mjtEq.mjEQ_CONNECT) else ()
         self.joints.append(Articulation(name=name, body=body, other=other, at=_vec(at), freedoms=freedoms))
+
+
+def joint_name(machine: Machine, link: int) -> str:
+    """Name of the joint between a link and its parent: that of the file's joint where it is one."""
+    if int(machine.model.body_jntnum[link]) == 1:
+        return machine.names.joint(int(machine.model.body_jntadr[link]))
+    return f"{machine.names.body(link)} joint"
 
 
 def _rigid(name: str, own: MassProperties, motion: Motion, geometry: Any) -> Body:

@@ -265,3 +265,25 @@ class Machine:
         found = np.zeros(9)
         self.mj.mju_quat2Mat(found, quaternion)
         return found.reshape(3, 3)
+
+    def quaternion(self, matrix: Array) -> Array:
+        """The quaternion (w, x, y, z) of a rotation [-], shape (4,), float64."""
+        found = np.zeros(4)
+        self.mj.mju_mat2Quat(found, np.ascontiguousarray(matrix).reshape(-1))
+        return found
+
+    def armature(self) -> Array:
+        """Of all rates [kg m^2, kg], shape (nv,), float64."""
+        return np.array(self.model.dof_armature)
+
+    def momenta(self, link: int, centre: Array, momentum: Array, spin: Array) -> Array:
+        """Generalised momenta of a body that a link carries at the latest data, shape (nv,), float64.
+
+        Args:
+            link: that carries it.
+            centre: its mass centre [m], shape (3,).
+            momentum, spin: linear [kg m/s] and angular about the centre [kg m^2/s], each shape (3,).
+        """
+        J, turning = np.zeros((3, self.nv)), np.zeros((3, self.nv))
+        self.mj.mj_jac(self.model, self.data, J, turning, centre, link)
+        return J.T @ momentum + turning.T @ spin

@@ -20,6 +20,8 @@ from warp_mca.scene import Body, Fixed, ImpactPhase, PositionServo, RigidPlane, 
 from warp_mca.scene.materials import Material
 
 if TYPE_CHECKING:
+    from warp_mca.results.result import Result
+    from warp_mca.robots.handback import HandBack
     from warp_mca.robots.machine import Machine
     from warp_mca.robots.masses import MassProperties
     from warp_mca.robots.skins import Skin
@@ -51,6 +53,7 @@ class Robot:
         controller: gives the controls at time t [s], coordinates and rates: controller(t, qpos, qvel). It is called at
             each period, and its controls are held in between.
         period: of the controller [s].
+        clock: time at the start, with which the controller is called first [s].
         mounts: node set by which each flexible link is held: by its parent, or by what rides on it, see `strike`.
             Where several links hold it: a dict of node sets by the name of the other link.
         against: planes and bodies beside the machine that it may touch.
@@ -68,6 +71,7 @@ class Robot:
     servos: Mapping[str, PositionServo] = field(default_factory=dict)
     controller: Controller | None = None
     period: float | None = None
+    clock: float = 0.0
     mounts: Mapping[str, Any] = field(default_factory=dict)
     against: tuple[RigidPlane | Body, ...] = ()
     touch: tuple[str, ...] = ()
@@ -93,6 +97,7 @@ class Robot:
             raise bad_value("Robot.period", self.period, "give a controller and the period at which it is called")
         if self.period is not None:
             validate.times("Robot", period=self.period)
+        validate.finite("Robot", clock=self.clock)
 
     def _body(self, name: str, item: Any) -> Body:
         """The body that a flexible link is made of, by the link's name.
@@ -189,6 +194,24 @@ class Robot:
         machine = self._machine()
         scene = HandOff(self, machine, found).scene(impact, self._pairs(machine), stiffness, mu, name)
         return replace(scene, fixed=(*scene.fixed, *fixed))
+
+    def after(self, swing: RobotSwing, scene: Scene, result: Result) -> HandBack:
+        """The machine after an impact, to swing on.
+
+        The motion at the end of the impact goes to the joints so that generalised momenta are kept; what vibrates is
+        lost, and stated. Flexible links get their shape back, so they must not have yielded.
+
+        Args:
+            swing: of this machine, at whose end it was handed over.
+            scene: that `strike` made of it.
+            result: of the run of that scene.
+
+        Raises:
+            RequestError: the result is not one of the scene, a flexible link yielded, or a flexible body beside moves.
+        """
+        from warp_mca.robots.handback import hand_back
+
+        return hand_back(self, swing, scene, result)
 
     def mount(self, link: str, other: str | None) -> str:
         """Node set by which a flexible link is held to another link, or to what rides on it.

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from warp_mca.robots.machine import Machine
     from warp_mca.robots.robot import Robot
 
+BEYOND = 0.01  # of the range of a joint that it may be beyond a limit at the start, as after an impact
 CLOSED = 1e-8  # gap of a loop at the start [m, rad], and rate at which it opens [m/s, rad/s]
 
 
@@ -50,7 +51,7 @@ def start_of(machine: Machine, robot: Robot) -> Array:
 
 def _check_limits(machine: Machine, y: Array) -> None:
     for place, dof, (low, high) in zip(machine.limited_q, machine.limited, machine.range, strict=True):
-        if not low <= y[place] <= high:
+        if not low - (beyond := BEYOND * (high - low)) <= y[place] <= high + beyond:
             name = machine.names.joint(int(machine.model.dof_jntid[dof]))
             remedy = f"start within its limits, {low:g} to {high:g}"
             raise bad_value(f"Robot.qpos of joint {name}", float(y[place]), remedy)

@@ -1,0 +1,92 @@
+"""Machines after an impact: momenta are kept, and the swing goes on to the next touch."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import warp_mca as mca
+from warp_mca.base.rotation import rotation_matrix
+from warp_mca.verify.machines import ARM, robot
+
+pytest.importorskip("mujoco")
+
+STEEL = mca.J2Bilinear(E=210e9, nu=0.3, rho=7850.0, sigma_y=250e6, E_t=1e9)
+# A free chain of three links: springs in its hinges drive a ball at its end against an anvil on its base.
+CHAIN = """<mujoco><compiler angle="radian"/><option gravity="0 0 0"/>
+  <default><geom contype="0" conaffinity="0" density="0"/></default>
+  <worldbody><body name="base"><freejoint name="free"/>
+    <inertial pos="0.02 0.01 0" mass="2" diaginertia="0.02 0.03 0.025"/>
+    <geom name="anvil" type="box" size="0.03 0.015 0.05" pos="0.05 0.12 0" contype="1" conaffinity="1"/>
+    <body name="mid" pos="0.1 0 0"><joint name="a" axis="0.1 0 1" stiffness="8" springref="0.6" armature="0.001"/>
+      <inertial pos="0.05 0 0" mass="0.6" diaginertia="0.002 0.003 0.0025"/>
+      <body name="tip" pos="0.1 0 0"><joint name="b" axis="0 0.2 1" stiffness="4" springref="2"/>
+        <inertial pos="0.03 0 0.01" mass="0.5" diaginertia="0.001 0.0015 0.0012"/>
+        <geom name="ball" type="sphere" size="0.025" pos="0.1 0 0" contype="1" conaffinity="1"/>
+  </body></body></body></worldbody></mujoco>"""
+START = {"qvel": {"free": (0.1, 0.2, -0.1, 0.5, 0.3, -1.0), "a": 1.0, "b": 3.0}, "qpos": {"a": 0.2, "b": 0.8}}
+IMPACT = mca.ImpactPhase(duration=1.8e-4, output_interval=1e-5)
+
+
+def momenta(machine, swing):
+    """Linear and angular momentum about the origin of all links at the end of a swing."""
+    scene = machine.strike(impact=IMPACT, swing=swing)
+    P, L = np.zeros(3), np.zeros(3)
+    for body in (body for body in scene.bodies if body.mass is not None):
+        R, spin = rotation_matrix(body.rotation), np.array(body.angular_velocity)
+        arm = R @ np.array(body.centre)
+        momentum = body.mass * (np.array(body.velocity) + np.cross(spin, arm))
+        P += momentum
+        L += np.cross(np.array(body.position) + arm, momentum) + R @ np.array(body.inertia) @ R.T @ spin
+    return P, L
+
+
+def test_free_chain_keeps_its_momenta_through_swings_and_impacts(tmp_path):
+    """The rotor of 1e-3 kg m^2 takes no part in the momenta of the whole: its reaction is that of the hinge."""
+    machine = robot(CHAIN.replace(' armature="0.001"', ""), tmp_path, **START)
+    swing = machine.swing()
+    P, L = momenta(machine, swing)
+    for _ in range(2):
+        scene = machine.strike(impact=IMPACT, swing=swing, stiffness=1e8)
+        before = swing
+        back = machine.after(swing, scene, mca.run(scene, precision="float64"))
+        machine = back.robot
+        swing = machine.swing()
+        assert swing.touch is not None and swing.t_end > 0.05
+        P1, L1 = momenta(machine, swing)
+        assert np.abs(P1 - P).max() < 1e-10 * np.linalg.norm(P)
+        assert np.abs(L1 - L).max() < 1e-10 * max(np.linalg.norm(L), 0.1)
+        assert abs(back.vibration) < 1e-6 * before.kinetic_energy
+
+
+def test_armature_has_its_share_of_the_momentum_that_comes_back(tmp_path):
+    """Without a touch the impact phase is a piece of the swing: rates at its end are those of the swing."""
+    machine = robot(CHAIN.replace('armature="0.001"', 'armature="0.02"'), tmp_path, **START)
+    swing = machine.swing(t_end=0.02)
+    scene = machine.strike(impact=replace(IMPACT, duration=1e-3, output_interval=5e-6), swing=swing)
+    back = machine.after(swing, scene, mca.run(scene, precision="float64"))
+    assert back.robot.clock == pytest.approx(0.021, abs=1e-5)
+    later = machine.swing(t_end=back.robot.clock)
+    assert np.array(back.robot.qpos) == pytest.approx(later.qpos, abs=1e-7)
+    assert np.array(back.robot.qvel) == pytest.approx(later.qvel, abs=1e-5)
+
+
+def test_what_does_not_come_back_is_refused(tmp_path):
+    machine = robot(CHAIN, tmp_path, **START)
+    swing = machine.swing(t_end=0.02)
+    scene = machine.strike(impact=replace(IMPACT, duration=1e-5, output_interval=1e-5), swing=swing)
+    result = mca.run(scene, precision="float64")
+    with pytest.raises(mca.RequestError, match="give the result of the scene other"):
+        machine.after(swing, replace(scene, name="other"), result)
+    rod = mca.Body(
+        name="tool",
+        geometry=mca.Rod(radius=0.008, length=0.16, section=2, ring=1, axial=4),
+        material=STEEL,
+        rotation=(0.0, -np.pi / 2, 0.0),
+    )
+    arm = robot(ARM, tmp_path, keyframe="strike", flexible={"tool": rod}, mounts={"tool": "start"})
+    result.summary["max_plastic_strain"] = 0.01
+    with pytest.raises(mca.RequestError, match="permanent shape would be lost"):
+        arm.after(swing, scene, result)
