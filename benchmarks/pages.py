@@ -36,6 +36,7 @@ PAGES = (
     "how-to/materials.md",
     "how-to/rubber.md",
     "how-to/damping.md",
+    "how-to/joints.md",
     "how-to/failure.md",
     "how-to/rigid_plane.md",
     "how-to/boundary.md",

@@ -101,7 +101,7 @@ def test_functions_that_the_page_names_exist():
 
 
 def everything() -> mca.Scene:
-    """A scene with each kind of thing that acts: contact, hinge, rail, driven node, absorbing side, tie, rigid joint."""
+    """A scene with each kind of thing that acts: contact, hinge, rail, driven node, absorbing side, tie, rigid one."""
     rail = mca.Box(size=(0.1, 0.02, 0.01), divisions=(10, 4, 2), origin=(0.0, -0.01, -0.01))
     cart = mca.Box(size=(0.02, 0.01, 0.01), divisions=(2, 2, 2), origin=(0.01, -0.005, 0.0))
     wall = mca.RigidPlane(point=(0.04, 0.0, 0.0), normal=(-1.0, 0.0, 0.0))

@@ -65,6 +65,7 @@ SOUND: dict[type, Any] = {
     geometry.InertiaBrick: geometry.InertiaBrick(mass=1.0, centre=(0.0, 0.0, 0.0), inertia=(1.0, 1.0, 1.0)),
     mca.Freedom: mca.Freedom(at=(0.0, 0.0, 0.0), stiffness=1.0, limits=(0.0, 1.0)),
     mca.PositionServo: mca.PositionServo(kp=1.0, kv=0.1, target=0.5, limits=(-1.0, 1.0)),
+    mca.Controller: mca.Controller(function=lambda t, q, rate: -q, period=1e-7),
     mca.Articulation: mca.Articulation(name="A", body="low", freedoms=(mca.Freedom(),)),
     mca.Universal: mca.Universal(name="U", body="low", axis=(1.0, 0.0, 0.0), second_axis=(0.0, 1.0, 0.0)),
     mca.Cylindrical: mca.Cylindrical(name="C", body="low", axis=(1.0, 0.0, 0.0)),
@@ -211,7 +212,7 @@ def scene_with(item: Any) -> mca.Scene:
             change = {"loads": (item,)}
         case mca.Freedom():
             return scene_with(mca.Articulation(name="A", body="low", freedoms=(item,)))
-        case mca.PositionServo():
+        case mca.PositionServo() | mca.Controller():
             return scene_with(mca.Freedom(motor=item))
         case Joint() if item.whole() is not None:
             change = {"joints": (item,), "bodies": (dataclasses.replace(low, rigid=True), up)}

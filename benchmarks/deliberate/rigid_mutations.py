@@ -23,34 +23,28 @@ RIGID_MUTATIONS: dict[str, Mutation] = {
         "poses_out.spin[b] - size *",
         "poses_out.spin[b] - wp.float64(0.0) * size *",
     ),
-    "loop_forgets_turning": Mutation(
-        "loops of a machine forget J' v",
-        "warp_mca/robots/machine.py",
-        "wanted = -(ahead - behind) / (2.0 * NUDGE)",
-        "wanted = -0.0 * (ahead - behind) / (2.0 * NUDGE)",
+    "joint_forgets_second": Mutation(
+        "joints between whole bodies act on the second one at its mass centre",
+        "kernels/nodes/rigid_joints.py",
+        "        step_out.lever[r, 1] = wp.quat_rotate_inv(poses.rotation[b], wp.cross(other, n) + t)",
+        "        step_out.lever[r, 1] = wp.quat_rotate_inv(poses.rotation[b], t)",
     ),
-    "limit_without_damping": Mutation(
-        "limits of a machine have no damper",
-        "warp_mca/robots/machine.py",
-        "2.0 * inertia * LIMIT_RATE",
-        "0.0 * inertia * LIMIT_RATE",
+    "freedom_not_carried": Mutation(
+        "the first freedom of a joint does not carry the second",
+        "kernels/nodes/rigid_joints.py",
+        "            tail = then(freedom_pose(e, joints, state, step_out), tail)",
+        "            tail = then(tail, tail)",
     ),
-    "quaternion_turns_in_the_world": Mutation(
-        "quaternions of a machine take angular velocities as those in the world",
-        "warp_mca/robots/machine.py",
-        "w * a + y * c - z * b, w * b + z * a - x * c, w * c + x * b - y * a",
-        "w * a - y * c + z * b, w * b - z * a + x * c, w * c - x * b + y * a",
+    "rotor_halved": Mutation(
+        "rotors in joints have half of their inertia",
+        "kernels/nodes/joint_drives.py",
+        "            A = joints.drive[e, wp.static(ARMATURE)]",
+        "            A = wp.float64(0.5) * joints.drive[e, wp.static(ARMATURE)]",
     ),
-    "touch_at_the_end_of_the_step": Mutation(
-        "a machine touches at the end of the step in which a gap closes",
-        "warp_mca/robots/swing.py",
-        "self.times.append(solver.t if touch is None else touch[0])",
-        "self.times.append(solver.t)",
-    ),
-    "drives_let_go": Mutation(
-        "drives of a machine do not act during an impact",
-        "warp_mca/robots/drives.py",
-        "if machine.passive or not drives:",
-        "if True or not drives:",
+    "cluster_moment_lost": Mutation(
+        "joints give the face of a flexible body no moment",
+        "kernels/nodes/rigid_joints.py",
+        "        step_out.twist[r] = -t\n",
+        "        step_out.twist[r] = wp.float64(0.0) * t\n",
     ),
 }

@@ -9,7 +9,7 @@ from warp_mca.kernels.loads.amplitude import Tables
 from warp_mca.kernels.nodes.screws import Twist
 
 HINGE, SLIDE, BALL = range(3)
-NO_MOTOR, TORQUE, SERVO = range(3)
+NO_MOTOR, TORQUE, SERVO, HELD = range(4)
 # columns of `RigidJoints.drive`; units are those of `scene.freedoms.Freedom`
 STIFFNESS, REST, DAMPING, FRICTION, FRICTION_RATE, ARMATURE, LOW, HIGH, LIMIT_STIFFNESS, LIMIT_DAMPING = range(10)
 KP, KV, LEAST, MOST, COLUMNS = range(10, 15)
@@ -35,7 +35,7 @@ class RigidJoints:
         part: 0, 1, 2 of the three rates of a ball, else 0, shape (rate_count,), int32.
         axis: unit vector of each rate where all positions are 0 [-], shape (rate_count,), vec3d.
         point: of its axis there [m], shape (rate_count,), vec3d.
-        motor: NO_MOTOR, TORQUE or SERVO, of each rate, shape (rate_count,), int32.
+        motor: NO_MOTOR, TORQUE, SERVO or HELD, of each rate, shape (rate_count,), int32.
         drive: its columns as above, shape (rate_count, COLUMNS), float64.
         tables: torques or targets of each rate.
         rounding: opening that rounding leaves [m].
@@ -76,6 +76,7 @@ class JointPoses:
         impulse: of force and moment of each joint so far [N s], [N m s], shape (LOADS joint_count,), float64.
         drive: of the motor of each rate so far [N m s], [N s], shape (rate_count,), float64.
         clock: steps that each joint has taken [-], shape (joint_count,), int32.
+        held: torque of each motor that is HELD [N m], [N], shape (rate_count,), float64.
     """
 
     position: wp.array(dtype=wp.float64)
@@ -86,6 +87,7 @@ class JointPoses:
     impulse: wp.array(dtype=wp.float64)
     drive: wp.array(dtype=wp.float64)
     clock: wp.array(dtype=wp.int32)
+    held: wp.array(dtype=wp.float64)
 
 
 @wp.struct

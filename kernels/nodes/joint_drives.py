@@ -23,6 +23,7 @@ from warp_mca.kernels.nodes.joint_arrays import (
     DAMPING,
     FRICTION,
     FRICTION_RATE,
+    HELD,
     HIGH,
     KP,
     KV,
@@ -71,6 +72,8 @@ def drive_rate(
     step_out.hold[e] = wp.float64(0.0)
     if joints.motor[e] == wp.static(TORQUE):
         step_out.torque[e] = mean_of_step(joints.tables, e, clock, dt, not moves)
+    if joints.motor[e] == wp.static(HELD):
+        step_out.torque[e] = state.held[e]
     if joints.motor[e] == wp.static(SERVO):
         target = value_at(joints.tables, e, dt * wp.float64(clock))
         T = joints.drive[e, wp.static(KP)] * (target - state.position[e])

@@ -84,6 +84,10 @@ def hand_back(robot: Robot, swing: RobotSwing, scene: Scene, result: Result) -> 
 def _check(robot: Robot, scene: Scene, summary: Mapping[str, Any]) -> None:
     if summary["scene"] != scene.name or "rigid_bodies" not in summary:
         raise bad_value("Robot.after: result", summary["scene"], f"give the result of the scene {scene.name}")
+    end = float(summary["simulated_time"]) - 1.5 * scene.impact.output_interval
+    if any(last > end for _, last in summary["contacts"]):
+        remedy = "a contact is still closed at its end; give it a longer one, in which all open"
+        raise bad_value("ImpactPhase.duration", float(summary["simulated_time"]), remedy)
     if summary["max_plastic_strain"] > 0.0 and robot.flexible:
         remedy = "flexible links yielded, and their permanent shape would be lost; go on with finite elements"
         raise bad_value("max_plastic_strain", float(summary["max_plastic_strain"]), remedy)

@@ -206,7 +206,7 @@ def _touch(machine: Machine, pair: Pair, t: float, y: Array) -> Touch:
     velocity = J @ v + pair.first.velocity(point, t) - pair.second.velocity(point, t)
     span = BEFORE / max(float(np.linalg.norm(velocity)), BEFORE)
     apart = pair.nearest(t - span, q - span * machine.coordinate_rates(q, v))
-    away = apart.first - apart.second
+    away = np.copysign(1.0, apart.distance) * (apart.first - apart.second)
     length = float(np.linalg.norm(away))
     normal = away / length if length > 0.0 else -velocity / np.linalg.norm(velocity)
     mobility = float(normal @ J @ inverse @ J.T @ normal)

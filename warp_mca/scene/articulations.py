@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.scene.bodies import Vec3
-from warp_mca.scene.freedoms import Freedom, Whole
+from warp_mca.scene.freedoms import Controller, Freedom, Whole
 from warp_mca.scene.joints import JOINTS, Joint
 
 if TYPE_CHECKING:
@@ -159,9 +159,24 @@ def check_whole(scene: Scene) -> None:
                 raise bad_value(f"{joint.title}.{name}", given, f"{body} moves as one rigid body; leave it out")
             if body is not None and body not in rigid and given is None:
                 raise bad_value(f"{joint.title}.{name}", given, f"name a node set of {body}, which is flexible")
+        for freedom in whole.freedoms:
+            if isinstance(freedom.motor, Controller):
+                _check_period(freedom.motor, scene.impact.output_interval)
         if scene.phases and any(freedom.motor for freedom in whole.freedoms):
             remedy = f"times of motors of {joint.title} count from the impact; leave phases out"
             raise bad_value("Scene.phases", "given", remedy)
+
+
+def _check_period(controller: Controller, interval: float) -> None:
+    """Refuse a period in which a whole number of output intervals does not fit.
+
+    Raises:
+        RequestError: so it is.
+    """
+    count = controller.period / interval
+    if count < 0.5 or abs(count - round(count)) > 1e-6 * count:
+        remedy = f"give a multiple of ImpactPhase.output_interval = {interval:g} s, at which it can be asked"
+        raise bad_value("Controller.period", controller.period, remedy)
 
 
 JOINTS.update({kind.__name__: kind for kind in (Articulation, Universal, Cylindrical)})

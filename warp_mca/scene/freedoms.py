@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from types import NoneType
 from typing import Literal
 
+import numpy as np
+
 from warp_mca.base import validate
+from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.scene.amplitude import Amplitude
 from warp_mca.scene.bodies import Vec3
@@ -46,6 +50,46 @@ class PositionServo:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Controller:
+    """A motor whose torque a Python function gives, which is asked at intervals; between them the torque is held.
+
+    One object may drive several freedoms: the function then sees all of them, in the order of the scene's joints.
+    Model files and batches take none.
+
+    Attributes:
+        function: called as function(t, q, rate) with the time since the start of the impact phase [s], positions [rad]
+            or [m] and rates half a step before [rad/s] or [m/s], each shape (freedom_count,), float64; returns torques
+            [N m] or forces [N], likewise, or one number for all.
+        period: between two calls [s], a multiple of `ImpactPhase.output_interval`.
+    """
+
+    function: Callable[[float, Array, Array], Array | Sequence[float] | float]
+    period: float
+
+    def __post_init__(self) -> None:
+        if not callable(self.function):
+            raise bad_value("Controller.function", validate.brief(self.function), "give a function of t, q and rate")
+        validate.times("Controller", period=self.period)
+
+    def torques(self, t: float, positions: Array, rates: Array) -> Array:
+        """What the function gives, shape (freedom_count,), float64.
+
+        Raises:
+            RequestError: it fails, or gives something else than finite numbers.
+        """
+        name = getattr(self.function, "__name__", type(self.function).__name__)
+        given = validate.call("Controller.function", name, "it", self.function, t, positions, rates)
+        try:
+            found = np.broadcast_to(np.asarray(given, dtype=np.float64), positions.shape)
+        except (TypeError, ValueError, OverflowError):
+            found = np.full(1, np.nan)
+        if not np.isfinite(found).all():
+            remedy = f"at {t:g} s it gives {validate.brief(given)}; return {len(positions)} finite numbers"
+            raise bad_value("Controller.function", name, remedy)
+        return found
+
+
+@dataclass(frozen=True, kw_only=True)
 class Freedom:
     """A hinge or a slide along an axis, or a ball joint about a point, of a joint between whole bodies.
 
@@ -69,8 +113,8 @@ class Freedom:
         limit_stiffness: of the springs beyond the limits [N m/rad], [N/m]. They shorten the time step where their
             frequency asks for it.
         limit_damping: of a damper that acts beyond the limits [N m s/rad], [N s/m].
-        motor: torque [N m] or force [N] over time as an `Amplitude`, or a `PositionServo`; times count from the start
-            of the impact phase.
+        motor: torque [N m] or force [N] over time as an `Amplitude`, a `PositionServo`, or a `Controller`; times count
+            from the start of the impact phase.
     """
 
     kind: Literal["hinge", "slide", "ball"] = "hinge"
@@ -86,7 +130,7 @@ class Freedom:
     limits: tuple[float, float] | None = None
     limit_stiffness: float = 1e6
     limit_damping: float = 0.0
-    motor: Amplitude | PositionServo | None = None
+    motor: Amplitude | PositionServo | Controller | None = None
 
     def __post_init__(self) -> None:
         validate.plain(self)
@@ -110,8 +154,8 @@ class Freedom:
         validate.positive(owner, friction_rate=self.friction_rate)
         if self.limits is not None:
             check_limits(owner, self.limits)
-        remedy = "give an Amplitude of torques, a PositionServo, or None"
-        validate.kinds(owner, (Amplitude, PositionServo, NoneType), remedy, motor=self.motor)
+        remedy = "give an Amplitude of torques, a PositionServo, a Controller, or None"
+        validate.kinds(owner, (Amplitude, PositionServo, Controller, NoneType), remedy, motor=self.motor)
         if self.kind == "ball":
             self._check_ball(owner)
 

@@ -32,6 +32,7 @@ from warp_mca.scene.bodies import Body
 from warp_mca.scene.catalogue import load_source
 from warp_mca.scene.contact_laws import CONTACT_LAWS
 from warp_mca.scene.failure import FAILURES
+from warp_mca.scene.freedoms import Controller
 from warp_mca.scene.friction_laws import FRICTION_LAWS
 from warp_mca.scene.joints import JOINTS
 from warp_mca.scene.loads import LOADS
@@ -235,6 +236,9 @@ def _encoded(value: object, arrays: list[NDArray]) -> object:
             remedy = "a model file holds warp_mca's own classes and what warp_mca.register was given; use these"
             raise bad_value("scene", type(value).__name__, remedy)
         members = {f.name: _encoded(getattr(value, f.name), arrays) for f in dataclasses.fields(value) if f.init}
+        if isinstance(value, Controller):
+            remedy = "a model file holds no functions; leave it out, and set it in the scene that is loaded"
+            raise bad_value("Freedom.motor", type(value).__name__, remedy)
         module = type(value).__module__
         outside = {} if module.startswith("warp_mca.") else {"$module": module}
         return {"$type": type(value).__name__, **outside, **members}

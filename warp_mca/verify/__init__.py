@@ -42,6 +42,8 @@ FILES = (
     "hinges",
     "rigid_bodies",
     "robots",
+    "body_joints",
+    "joint_loops",
     "loads",
 )
 

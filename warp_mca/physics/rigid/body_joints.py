@@ -38,7 +38,7 @@ class BodyJoint:
         axis: where all positions are 0, unit vectors [-], shape (rate_count, 3), float64.
         point: of each axis there [m], shape (rate_count, 3), float64.
         position: of each rate at the start [rad], [m], shape (rate_count,), float64.
-        motor: of each rate, NO_MOTOR, TORQUE or SERVO, shape (rate_count,), int32.
+        motor: of each rate, NO_MOTOR, TORQUE, SERVO or HELD, shape (rate_count,), int32.
         drive: columns of `RigidJoints.drive`, shape (rate_count, COLUMNS), float64.
         tables: torque or target of each rate over time.
         scene: number of the scene in a batch.
@@ -103,7 +103,8 @@ class BodyJoint:
 
 
 def check_alike(models: Sequence[Model]) -> None:
-    """Refuse scenes of a batch whose joints between whole bodies are others: records list them by place.
+    """Refuse scenes of a batch whose joints between whole bodies are others, for records list them by place, or that a
+    function drives.
 
     Raises:
         RequestError: there are such scenes.
@@ -114,6 +115,10 @@ def check_alike(models: Sequence[Model]) -> None:
             names = [name for name, _ in own]
             remedy = "scenes of a batch have the same joints between whole bodies; run them apart"
             raise bad_value(f"joints of scenes[{k}]", names, remedy)
+        for item in models[k].body_joints:
+            if (item.motor == columns.HELD).any():
+                remedy = "a batch asks no functions; use run in place of run_batch"
+                raise bad_value(f"motor of joint {item.name}", "Controller", remedy)
 
 
 def readings(items: Sequence[BodyJoint]) -> tuple[tuple[str, ...], tuple[str, ...]]:

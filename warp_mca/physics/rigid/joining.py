@@ -17,7 +17,7 @@ from warp_mca.physics.joints.constraints import JointPairs
 from warp_mca.physics.rigid.body_joints import BodyJoint, exponential
 from warp_mca.physics.rigid.rows import RigidPin, RigidRow
 from warp_mca.scene.amplitude import CONSTANT, Amplitude
-from warp_mca.scene.freedoms import Freedom, PositionServo, Whole
+from warp_mca.scene.freedoms import Controller, Freedom, PositionServo, Whole
 from warp_mca.scene.joints import Joint
 
 if TYPE_CHECKING:
@@ -158,11 +158,15 @@ def _drive(freedom: Freedom) -> list[float]:
 def _motor(freedom: Freedom) -> int:
     if freedom.motor is None:
         return columns.NO_MOTOR
+    if isinstance(freedom.motor, Controller):
+        return columns.HELD
     return columns.SERVO if isinstance(freedom.motor, PositionServo) else columns.TORQUE
 
 
 def _table(freedom: Freedom) -> Amplitude:
-    return freedom.motor.table if isinstance(freedom.motor, PositionServo) else freedom.motor or CONSTANT
+    if isinstance(freedom.motor, PositionServo):
+        return freedom.motor.table
+    return freedom.motor if isinstance(freedom.motor, Amplitude) else CONSTANT
 
 
 def _quaternion(R: Array) -> Array:

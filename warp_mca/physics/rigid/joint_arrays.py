@@ -42,6 +42,7 @@ class JointState:
             joint_count,), float64.
         drive: torque or force of each motor, summed over the steps [N m s], [N s], shape (rate_count,), float64.
         clock: steps that each joint has taken [-], shape (joint_count,), int32.
+        held: torque or force of motors that a function gives [N m], [N], shape (rate_count,), float64.
     """
 
     position: wp.array
@@ -52,6 +53,7 @@ class JointState:
     impulse: wp.array
     drive: wp.array
     clock: wp.array
+    held: wp.array
 
 
 class JointArrays:
@@ -139,7 +141,7 @@ class JointArrays:
     def new_state(self) -> JointState:
         """State before `start`, on the current device."""
         rates, at_rest = int(self.rates[-1]), [(0.0, 0.0, 0.0, 1.0)]
-        zeros = {name: wp.zeros(rates, dtype=wp.float64) for name in ("rate", "work", "heat", "drive")}
+        zeros = {name: wp.zeros(rates, dtype=wp.float64) for name in ("rate", "work", "heat", "drive", "held")}
         position = np.concatenate([np.zeros(0), *(item.position for item in self.items)])
         return JointState(
             **zeros,
@@ -152,7 +154,7 @@ class JointArrays:
     def poses(self, state: State) -> Any:
         """The state as kernels take it."""
         found, own = JointPoses(), state.rigid.joints
-        for name in ("position", "rate", "ball", "work", "heat", "impulse", "drive", "clock"):
+        for name in ("position", "rate", "ball", "work", "heat", "impulse", "drive", "clock", "held"):
             setattr(found, name, getattr(own, name))
         return found
 
