@@ -48,17 +48,14 @@ def test_free_chain_keeps_its_momenta_through_swings_and_impacts(tmp_path):
     machine = robot(CHAIN.replace(' armature="0.001"', ""), tmp_path, **START)
     swing = machine.swing()
     P, L = momenta(machine, swing)
-    for _ in range(2):
-        scene = machine.strike(impact=IMPACT, swing=swing, stiffness=1e8)
-        before = swing
-        back = machine.after(swing, scene, mca.run(scene, precision="float64"))
-        machine = back.robot
-        swing = machine.swing()
-        assert swing.touch is not None and swing.t_end > 0.05
-        P1, L1 = momenta(machine, swing)
-        assert np.abs(P1 - P).max() < 1e-10 * np.linalg.norm(P)
-        assert np.abs(L1 - L).max() < 1e-10 * max(np.linalg.norm(L), 0.1)
-        assert abs(back.vibration) < 1e-6 * before.kinetic_energy
+    scene = machine.strike(impact=IMPACT, swing=swing, stiffness=1e8)
+    back = machine.after(swing, scene, mca.run(scene, precision="float64"))
+    again = back.robot.swing()
+    assert again.touch is not None and again.t_end > 0.05
+    P1, L1 = momenta(back.robot, again)
+    assert np.abs(P1 - P).max() < 1e-10 * np.linalg.norm(P)
+    assert np.abs(L1 - L).max() < 1e-10 * max(np.linalg.norm(L), 0.1)
+    assert abs(back.vibration) < 1e-6 * swing.kinetic_energy
 
 
 def test_armature_has_its_share_of_the_momentum_that_comes_back(tmp_path):
