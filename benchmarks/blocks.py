@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 import warp_mca as mca
 from warp_mca.geometry.cell_types import TETRAHEDRON, linear_type
 from warp_mca.model.build import build_model
-from warp_mca.model.model import Model
-from warp_mca.model.stable_step import Elements, StableStep, stable_step
+from warp_mca.model.stable_step import Elements, stable_step
 from warp_mca.physics.elements import ELEMENTS
 from warp_mca.step.solver import Solver
+from warp_mca.system.model import Model
+from warp_mca.system.time_step import StableStep
 
 STEEL = mca.J2Bilinear(E=210e9, nu=0.3, rho=7850.0, sigma_y=400e6, E_t=2e9)
 SIZES = {"5k": 5_000, "50k": 50_000, "159k": 159_000, "1M": 1_000_000, "4M": 4_000_000, "16M": 16_000_000}

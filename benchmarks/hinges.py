@@ -20,14 +20,14 @@ from numpy.typing import NDArray
 
 import warp_mca as mca
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.model.model import Model
 from warp_mca.phases.carry_out import begin
 from warp_mca.phases.prepare import Request, prepare
 from warp_mca.phases.settings import Settings
 from warp_mca.scene import model_file
 from warp_mca.scene.catalogue import parse_overrides
 from warp_mca.step.solver import Solver
-from warp_mca.step.state import State
+from warp_mca.system.model import Model
+from warp_mca.system.state import State
 
 Array = NDArray[np.float64]
 

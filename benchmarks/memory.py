@@ -26,7 +26,7 @@ def arrays(owner: Any, seen: dict[int, wp.array], owners: dict[int, Any]) -> dic
             if value.ptr and (value.ptr not in seen or size(value) > size(seen[value.ptr])):  # not a view of it
                 seen[value.ptr] = value
         elif type(value).__module__.startswith("warp_mca.") or isinstance(value, list | tuple | dict):
-            if not type(value).__module__.startswith("warp_mca.model.model"):
+            if not type(value).__module__.startswith("warp_mca.system.model"):
                 arrays(value, seen, owners)
         elif type(value).__name__ in ("StructInstance", "NewStructInstance"):
             for name in value._cls.vars:

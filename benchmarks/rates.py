@@ -12,8 +12,8 @@ from benchmarks.blocks import FULL, RATES, SAVINGS, Held
 from benchmarks.memory import memory
 from benchmarks.stages import shares
 from benchmarks.timing import Care, clock, ratio, seconds_per_call, steps_per_graph
-from warp_mca.model.model import Model
-from warp_mca.step.stage import Step
+from warp_mca.system.model import Model
+from warp_mca.system.stage import Step
 
 
 def steps_of(held: Held, care: Care) -> int:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from benchmarks.blocks import Held
 from benchmarks.timing import Care, captured, seconds_per_call, steps_per_graph
-from warp_mca.step.stage import Step
+from warp_mca.system.stage import Step
 
 
 def bodies(held: Held) -> dict[str, Callable[[], None]]:

@@ -23,7 +23,7 @@ from warp_mca.physics.elements.patch_stage import PatchStage
 from warp_mca.scene.catalogue import load_source
 from warp_mca.scene.options import with_options
 from warp_mca.step.rate_chains import Chains, Task
-from warp_mca.step.stage import Stage, Step
+from warp_mca.system.stage import Stage, Step
 
 TURNS = 10  # launches of a part in one graph
 SPAN = 5e-3  # of the impact phase, which sets its steps [s]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import warp as wp
 
-from warp_mca.step.threads import flushing
+from warp_mca.system.threads import flushing
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from warp_mca.geometry.tetrahedron import gradients, volumes
 from warp_mca.physics.elements.element import Array
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Block
     from warp_mca.physics.elements.stage import ElementStage
+    from warp_mca.system.model import Block
 
 
 class LinearTet:

@@ -197,7 +197,7 @@ def test_one_scene_is_run_as_alone():
 
 @pytest.mark.filterwarnings("ignore:overflow")
 def test_a_scene_that_breaks_leaves_the_others_alone(tmp_path, monkeypatch):
-    monkeypatch.setattr("warp_mca.model.precision.MODULI", (0.0, np.inf))  # such scenes are refused otherwise
+    monkeypatch.setattr("warp_mca.system.precision.MODULI", (0.0, np.inf))  # such scenes are refused otherwise
     sunk, overflowed = hinged(penalty=1e-7, speed=30.0, duration=1.5e-4), hinged(duration=1.5e-4)
     metal = mca.Elastic(E=1e39, nu=0.0, rho=2700e28)  # its stress is beyond float32
     overflowed = replace(overflowed, bodies=tuple(replace(body, material=metal) for body in overflowed.bodies))

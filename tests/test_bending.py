@@ -15,8 +15,8 @@ from warp_mca.cli.main import main
 from warp_mca.geometry.degenerate import stored, tetrahedral
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.build import build_model
-from warp_mca.model.model import Model
 from warp_mca.step.solver import Solver
+from warp_mca.system.model import Model
 from warp_mca.verify.case import Setup
 from warp_mca.verify.limits import METAL, SIGMA_Y
 from warp_mca.verify.small_meshes import brick

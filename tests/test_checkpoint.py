@@ -19,7 +19,7 @@ from warp_mca.phases.carry_out import restored
 from warp_mca.phases.checkpoint import FILE, Checkpoint
 from warp_mca.phases.every import Every
 from warp_mca.phases.impact import Impact
-from warp_mca.step.records import SceneRecords
+from warp_mca.system.records import SceneRecords
 
 pytestmark = pytest.mark.usefixtures("no_figures")
 

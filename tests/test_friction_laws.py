@@ -13,10 +13,11 @@ import warp_mca as mca
 from warp_mca.geometry.cell_types import is_triangle
 from warp_mca.physics.contact.friction_laws import node_areas
 from warp_mca.physics.contact.sides import face_geometry
-from warp_mca.physics.contact.surfaces import Faces, make_faces
+from warp_mca.physics.contact.surfaces import make_faces
 from warp_mca.recorders.recorder import CONTACT
 from warp_mca.scene import model_file
 from warp_mca.scenes import sliding_block
+from warp_mca.system.contact import Faces
 from warp_mca.verify.case import Setup
 from warp_mca.verify.friction import sunk
 

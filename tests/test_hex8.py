@@ -57,7 +57,8 @@ def launch(X, hexahedra, u, precision, *, sigma_y=None):
         wp.launch(kernel, count, inputs=[*arrays, law, field, 0, count, 0.0], outputs=[*history, extreme, force])
         kernel = hex8.energy_kernel(precision, law_name)
         nodal = wp.zeros((0, 0), dtype=int), wp.zeros(0, dtype=t.real)
-        wp.launch(kernel, count, inputs=[*arrays, law, *history, extreme, field, 0, *nodal], outputs=[energy])
+        outputs = [energy, wp.zeros((5, count), dtype=wp.float32)]
+        wp.launch(kernel, count, inputs=[*arrays, law, *history, extreme, field, 0, *nodal], outputs=outputs)
     total = np.zeros_like(X)
     for a in range(8):
         np.add.at(total, hexahedra[:, a], force.numpy().reshape(8, count, 3)[a].astype(float))

@@ -12,7 +12,7 @@ from test_batch import hinged
 
 from warp_mca.base.joining import AS_IS, ITEMS, SCENE, join, joinable, of, offsets_of
 from warp_mca.model.batch_model import join_models
-from warp_mca.model.model import Model
+from warp_mca.system.model import Model
 
 
 def widened(item: Any, **more: object) -> Any:
@@ -50,7 +50,7 @@ def test_values_in_fields_with_defaults_are_carried():
 
 
 def scaling(model: Model) -> Any:
-    from warp_mca.model.mass_scaling import MassScaling
+    from warp_mca.system.time_step import MassScaling
 
     return MassScaling(added=0.1 * model.mass, elements=3, plain_dt=model.stable.dt)
 

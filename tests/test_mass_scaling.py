@@ -12,7 +12,7 @@ from test_timestep import CASES, DEPTH, H, box, frequencies, graded, scene
 import warp_mca as mca
 from warp_mca.cli.main import main
 from warp_mca.model import mass_scaling
-from warp_mca.model.model import Model
+from warp_mca.system.model import Model
 
 
 @pytest.fixture

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 import warp_mca as mca
 from warp_mca.cli.main import main
 from warp_mca.kernels.elements import hex8, hex8_patch
-from warp_mca.model.rates import Rates
 from warp_mca.phases.division import divide
 from warp_mca.phases.impact import Impact
 from warp_mca.phases.rate_groups import COSTS, StepCost, grouping
 from warp_mca.physics.elements.patch_stage import PatchStage
 from warp_mca.scene.catalogue import load_source
+from warp_mca.system.time_step import Rates
 
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7800.0)
 METAL = mca.J2Bilinear(E=70e9, nu=0.3, rho=2700.0, sigma_y=5e6, E_t=7e9, beta=0.3)

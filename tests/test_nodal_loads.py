@@ -16,7 +16,7 @@ from test_bending import grid
 import warp_mca as mca
 from warp_mca.kernels.loads.amplitude import Tables, mean_value, value_at
 from warp_mca.physics.loads.pushed import tables_of
-from warp_mca.step.stage import Step
+from warp_mca.system.stage import Step
 from warp_mca.verify.small_meshes import mixed_cube
 
 DEVICES = ["cpu", pytest.param("cuda:0", marks=pytest.mark.gpu)]

@@ -16,12 +16,12 @@ import warp_mca as mca
 from warp_mca.cli.main import main
 from warp_mca.kernels.materials.laws import law_functions
 from warp_mca.phases.settle import HalfSteps
-from warp_mca.physics.loads.nodal import LoadedNodes
 from warp_mca.registration import TABLES
 from warp_mca.scene.contact_laws import Penalty
 from warp_mca.scene.joints import Joint
 from warp_mca.scene.loads import Load
 from warp_mca.scene.ties import Ties
+from warp_mca.system.loads import LoadedNodes
 
 UNTYPED = '''"""A block whose contact law multiplies a float64 by a float32."""
 from dataclasses import dataclass

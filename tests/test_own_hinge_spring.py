@@ -17,15 +17,15 @@ from outside import goes_on
 
 import warp_mca as mca
 from warp_mca.base.joining import AS_IS, joinable
-from warp_mca.physics.loads.nodal import LoadedNodes
 from warp_mca.physics.loads.nodal_stage import NodalLoad
 from warp_mca.scene.loads import Load
+from warp_mca.system.loads import LoadedNodes
 
 if TYPE_CHECKING:
-    from warp_mca.model.assembly import Assembly
-    from warp_mca.step.solver import Solver
-    from warp_mca.step.stage import Step
-    from warp_mca.step.state import State
+    from warp_mca.system.actor import System
+    from warp_mca.system.bodies import Bodies
+    from warp_mca.system.stage import Step
+    from warp_mca.system.state import State
 
 
 @mca.register
@@ -59,7 +59,7 @@ class TorsionSpring(Load):
         other = {"other_nodes": (self.other, self.other_nodes, False)} if self.other and self.other_nodes else {}
         return {"nodes": (self.body, self.nodes, False), **other}
 
-    def build(self, assembly: Assembly, start: float) -> TurnedNodes:
+    def build(self, assembly: Bodies, start: float) -> TurnedNodes:
         sides = [assembly.nodes(self.body, self.nodes)]
         sides += [assembly.nodes(self.other, self.other_nodes)] if self.other and self.other_nodes else []
         arms, inertia = [], []
@@ -175,7 +175,7 @@ def spring_torque(
 class TorsionSprings(NodalLoad):
     """All springs, one after the other."""
 
-    def __init__(self, solver: Solver, name: str) -> None:
+    def __init__(self, solver: System, name: str) -> None:
         super().__init__(solver, name)
         self.arrays = [
             [

@@ -13,7 +13,7 @@ from warp_mca.kernels.nodes.hinge import Ahead, Side, hinge_inverse
 from warp_mca.kernels.resident import pin_joint
 from warp_mca.kernels.resident.node_role import Nodes
 from warp_mca.kernels.resident.pin_joint import COLUMNS, TOTALS
-from warp_mca.step.stage import Step
+from warp_mca.system.stage import Step
 
 
 @wp.kernel(enable_backward=False)

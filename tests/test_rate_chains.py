@@ -22,8 +22,8 @@ from warp_mca.kernels.nodes.gather import Kind
 from warp_mca.physics.elements.patch_stage import PatchStage
 from warp_mca.step import early_launch
 from warp_mca.step.rate_chains import Chains, Task, tasks
-from warp_mca.step.stage import Step
-from warp_mca.step.threads import flushing
+from warp_mca.system.stage import Step
+from warp_mca.system.threads import flushing
 
 
 def in_some_order(found: list[Task], top: int, seed: int) -> list[Task]:

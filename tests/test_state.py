@@ -31,9 +31,9 @@ from warp_mca.physics.contact.contact_state import ContactState
 from warp_mca.physics.elements.state import ElementState
 from warp_mca.physics.joints.constraint_stage import ConstraintState
 from warp_mca.physics.loads.stage import LoadState
-from warp_mca.step.records import SceneRecords
-from warp_mca.step.state import State
 from warp_mca.step.state_figures import max_speed
+from warp_mca.system.records import SceneRecords
+from warp_mca.system.state import State
 
 pytestmark = pytest.mark.usefixtures("short_ranges")
 

@@ -13,12 +13,12 @@ from impacts import begun, figures, finished
 from test_multi_rate import hinged
 
 from warp_mca.physics.contact.stage import ContactStage
-from warp_mca.step import stage
 from warp_mca.step.replay import Replay
 from warp_mca.step.solver import Solver
-from warp_mca.step.stage import Stage, Step, Streams
-from warp_mca.step.state import State
-from warp_mca.step.threads import flushing
+from warp_mca.system import stage
+from warp_mca.system.stage import Stage, Step, Streams
+from warp_mca.system.state import State
+from warp_mca.system.threads import flushing
 
 ENERGIES = {"element energies", "paths, frames: stress", "element sums", "spring sums"}
 Done = set[str]
@@ -32,7 +32,7 @@ class Stream:
 
 
 class Order:
-    """Stands for `warp` in `warp_mca.step.stage`: what each stage waits for, in `waits`."""
+    """Stands for `warp` in `warp_mca.system.stage`: what each stage waits for, in `waits`."""
 
     def __init__(self, streams: Streams) -> None:
         streams.streams = {name: Stream() for name in streams.streams}

@@ -10,7 +10,8 @@ import warp as wp
 
 import warp_mca as mca
 from warp_mca.cli.main import main
-from warp_mca.step import solver, threads
+from warp_mca.step import solver
+from warp_mca.system import threads
 
 pytestmark = pytest.mark.usefixtures("short_ranges")
 

@@ -9,14 +9,15 @@ import warp_mca as mca
 from warp_mca.model import stable_step as timestep
 from warp_mca.model.assembly import Assembly
 from warp_mca.model.build import build_model
-from warp_mca.model.model import Model
 from warp_mca.model.stable_step import Elements, stable_step
+from warp_mca.physics.contact.surfaces import surface_faces
 from warp_mca.physics.elements import ELEMENTS
 from warp_mca.physics.elements.cells import nodal_masses
 from warp_mca.physics.elements.hexahedron import eigenvalue_bounds, largest_eigenvalues, lumped_masses
 from warp_mca.rigid.handoff import hand_off
 from warp_mca.step.solver import Solver
 from warp_mca.step.steps import Steps
+from warp_mca.system.model import Model
 
 STEEL = mca.Elastic(E=200e9, nu=0.3, rho=7800.0)
 H = 0.01
@@ -257,7 +258,7 @@ def test_steps_of_single_elements_are_lower_bounds(coarse: bool):
     start = hand_off(made, meshes, nodal_masses(made, meshes))
     parts = Assembly(made, meshes, start.positions)
     added = np.zeros(len(parts.X))
-    added[parts.faces(made.contacts[0].slave).nodes] = 1e12
+    added[surface_faces(parts, made.contacts[0].slave).nodes] = 1e12
     (cells,), (mass,) = parts.cells, parts.element_mass
     alone = [
         stable_step(parts.elements(cells.element, cells.conn[[k]], mass[[k]], added, cells.index[[k]])).dt

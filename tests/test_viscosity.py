@@ -15,7 +15,6 @@ from test_cycle import scene as cycle_scene
 import warp_mca as mca
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.model.build import build_model
-from warp_mca.model.model import Model
 from warp_mca.phases.cycle import Cycle
 from warp_mca.phases.prepare import Request
 from warp_mca.phases.settings import Settings
@@ -24,6 +23,7 @@ from warp_mca.physics.elements.cells import nodal_masses
 from warp_mca.rigid.handoff import hand_off
 from warp_mca.scene import model_file
 from warp_mca.step.solver import Solver
+from warp_mca.system.model import Model
 
 STEEL = mca.Elastic(E=200e9, nu=0.3, rho=7800.0)
 METAL = mca.J2Bilinear(E=200e9, nu=0.3, rho=7800.0, sigma_y=400e6, E_t=2e9)

@@ -13,8 +13,8 @@ from warp_mca.geometry import Box, Mesh
 from warp_mca.geometry.degenerate import tetrahedral
 from warp_mca.geometry.quality import check
 from warp_mca.model.build import build_model
-from warp_mca.model.model import Model
 from warp_mca.physics.elements.cells import body_materials
+from warp_mca.system.model import Model
 
 
 def broken(fault: str) -> Mesh:

@@ -7,7 +7,7 @@ import warp as wp
 
 wp.config.quiet = True
 import warp_mca as mca  # noqa: E402
-from warp_mca.model.model import build_model  # noqa: E402
+from warp_mca.model.build import build_model  # noqa: E402
 from warp_mca.step.solver import Solver  # noqa: E402
 
 element = "hex8r" if "hex8r" in sys.argv else "hex8"

@@ -9,8 +9,8 @@ from typing import Any
 
 import warp_mca as mca
 from benchmarks.stability.axis import AXES, Direct, Figure, Trial, Value, with_element
-from warp_mca.model.model import Model
 from warp_mca.phases import division
+from warp_mca.system.model import Model
 
 PRECISIONS = ("mixed", "float64")
 Cell = dict[str, Any]

@@ -7,10 +7,19 @@ import warp as wp
 
 from warp_mca.kernels.elements.formulation import MEAN, NODAL, OWN, Maker, load_function, parts_of
 from warp_mca.kernels.elements.viscosity import THERMAL
-from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.materials.isochoric import law_kinematics
 from warp_mca.kernels.materials.kinematics import kinematics
-from warp_mca.kernels.records.extremes import LAG_LOSS, STRAIN_SQUARE, VOLUME_LOSS
+from warp_mca.kernels.materials.laws import law_functions
+from warp_mca.kernels.records.extremes import (
+    LAG_LOSS,
+    PLASTIC_STRAIN,
+    RECORDS,
+    STRAIN_SQUARE,
+    VOLUME_LOSS,
+    VON_MISES,
+    keep_peak,
+)
 
 wp.set_module_options({"enable_backward": False})
 
@@ -79,8 +88,32 @@ def swelling_functions(precision: str, finite: bool, heated: bool) -> tuple[Any,
 
 
 @cache
+def peaks_function(precision: str, law_name: str, finite: bool, points: int) -> Any:
+    """The function that keeps von Mises stress and plastic strain of points where greatest, see `records.extremes`."""
+    t, cauchy = scalars(precision), law_kinematics(precision, law_name, finite).cauchy
+    R, vec3, mat33 = t.real, t.vec3, t.mat33
+    flows = law_functions(law_name, precision).plastic_row >= 0
+
+    @wp.func
+    def keep_peaks(e: int, g: int, H: mat33, S: mat33, N: mat33, d: vec3, p: R, peak_out: wp.array2d(dtype=wp.float32)):
+        sigma = cauchy(H, S, N, d, R(0.0))  # the pressure does not count
+        trace = wp.trace(sigma)
+        square = R(1.5) * wp.max(wp.ddot(sigma, sigma) - R(THIRD) * trace * trace, R(0.0))
+        record = peak_out[wp.static(RECORDS), e]
+        keep_peak(wp.static(VON_MISES), e, wp.float32(wp.sqrt(square)), record, peak_out)
+        if wp.static(flows):
+            keep_peak(wp.static(PLASTIC_STRAIN), e, wp.float32(p), record, peak_out)
+        last = wp.where(g == wp.static(points - 1), wp.float32(1.0), wp.float32(0.0))
+        peak_out[wp.static(RECORDS), e] = record + last
+
+    return keep_peaks
+
+
+@cache
 def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = False, heated: bool = False) -> Any:
     """Kernel: elastic, plastic and hourglass energy [J], greatest strain and smallest Jacobian ratio [-] so far.
+
+    peak_out keeps the greatest von Mises stress [Pa] and plastic strain [-] of any record, see `records.extremes`.
 
     The points' own Jacobians are those of this step; of the steps between, the force kernels keep that of the centre.
     An inverted element's Q is a reflection, which would hide the inversion in its own frame.
@@ -95,6 +128,7 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
     late = form.pressure == MEAN and not general  # one pass over the points: a second would not fit side by side
     k, R = law_kinematics(precision, law_name, finite), scalars(precision).real
     dilatation_of, deviator, volumetric_energy = k.dilatation, k.deviator, k.volumetric_energy
+    keep_peaks = peaks_function(precision, law_name, finite, points)
 
     # logarithms need all their digits
     @wp.kernel(enable_backward=False, module="unique", grid_stride=False, module_options={"fast_math": not finite})
@@ -111,6 +145,7 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
         group: wp.array2d(dtype=wp.int32),
         dilatation: wp.array(dtype=R),
         energy_out: wp.array2d(dtype=R),
+        peak_out: wp.array2d(dtype=wp.float32),
     ):
         e = wp.tid()
         m = material[e]
@@ -123,21 +158,20 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
         theta, elastic, swelling = R(0.0), R(0.0), swelling_of(e, K, extreme)
         if wp.static(not late):
             theta, _pressure, elastic = shared(shape, e, K, swelling, group, dilatation)
-        volume = R(0.0)
-        growth = R(0.0)
-        dissipated = R(0.0)
+        volume, growth, dissipated = R(0.0), R(0.0), R(0.0)
         largest = extreme[STRAIN_SQUARE, e]
         smallest = R(1.0)
         for g in range(wp.static(points)):
             weight, H = gradient(shape, g)
-            strain, _N, _d = deviator(H)
+            strain, N, d = deviator(H)
             largest = wp.max(largest, wp.ddot(strain, strain))
             if wp.static(own):
                 theta = dilatation_of(H)
             if wp.static(late):
                 volume += weight
                 growth += dilatation_of(H) * weight
-            _S, _pressure, _p, stored, spent = read(strain, theta, G, place(g), e, m, flag, law, history)
+            S, _pressure, p, stored, spent = read(strain, theta, G, place(g), e, m, flag, law, history)
+            keep_peaks(e, g, H, S, N, d, p, peak_out)
             if wp.static(own and not general):
                 stored += volumetric_energy(K, elastic_dilatation(theta, swelling))
             elastic += weight * stored
@@ -147,7 +181,8 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
             elastic += volume * volumetric_energy(K, elastic_dilatation(growth / volume, swelling))
         energy_out[0, first + e] = elastic
         energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * largest)
-        smallest = wp.min(smallest * wp.determinant(identity + rotation(shape)), R(1.0) - extreme[VOLUME_LOSS, e])
+        smallest = smallest * wp.determinant(identity + rotation(shape))
+        energy_out[3, first + e] = wp.min(smallest, R(1.0) - extreme[VOLUME_LOSS, e])
         hourglass = R(0.0)
         if wp.static(lags):
             hourglass = extreme[LAG_LOSS, e]
@@ -155,7 +190,6 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
             hourglass, spent = modes(shape, K, G, flag, history, e)
             dissipated += spent
         energy_out[1, first + e] = dissipated
-        energy_out[3, first + e] = smallest
         energy_out[4, first + e] = hourglass
 
     return element_energy

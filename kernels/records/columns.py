@@ -16,6 +16,6 @@ NORMAL_FORCE, PRESSURE, NORMAL_ENERGY, LOST, SQUARES, MADE = slice(8, 11), 11, 1
 DAMPED = 16
 PASS_COLUMNS = 17
 
-# Behind the passes stand the columns of other actors, see `model.columns`. Of absorbing boundaries: energy that bodies
+# Behind the passes stand the columns of other actors, see `system.columns`. Of absorbing boundaries: energy that bodies
 # gave to what lies beyond them, in the frame of the body, and work that this does on the bodies as it moves along [J].
 ABSORBED, BEYOND_WORK = 0, 1

@@ -8,6 +8,10 @@ import warp as wp
 # Rows of the extremes of elements; the last one only where internal vectors lag behind:
 STRAIN_SQUARE, VOLUME_LOSS, LAG_LOSS = 0, 1, 2
 
+# Rows of `ElementState.peak`: records so far; greatest von Mises stress and equivalent plastic strain, each followed by
+# the number of its record, from 0 on. The last two only of elements that flow.
+RECORDS, VON_MISES, PLASTIC_STRAIN = 0, 1, 3
+
 
 # Smaller values are left to check records, so that most elements write nothing in a step.
 _FLOOR = {"strain": 1e-6, "volume": 0.02}  # e : e and 1 - J [-]
@@ -53,6 +57,14 @@ def keep_functions(scalar: Any) -> tuple[Any, Any, Any]:
         return (scalar(0.5) * compliance) * (compliance * J2)
 
     return keep_strain, keep_volume, strain_square
+
+
+@wp.func
+def keep_peak(row: int, e: int, value: wp.float32, record: wp.float32, peak_out: wp.array2d(dtype=wp.float32)):
+    """Keep the greatest value of an element in a row and its record in the next, without branches for `vectorised`."""
+    least = peak_out[row, e]
+    peak_out[row, e] = wp.max(least, value)
+    peak_out[row + 1, e] = wp.where(value > least, record, peak_out[row + 1, e])
 
 
 _KEEP_SPEED = """

@@ -1,1 +1,1 @@
-"""Owns a scene as arrays that never change: assembly, constraints, contact surfaces, stable step."""
+"""Owns how a scene becomes a Model: assembly, stable step, mass scaling, several rates, joining of scenes."""

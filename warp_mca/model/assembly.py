@@ -8,16 +8,11 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.base.errors import bad_value
 from warp_mca.geometry.cell_types import CELL_TYPES
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.kernels.elements.patch_layout import PATCH
-from warp_mca.model.block import Block
-from warp_mca.model.failing import criterion_of, failing_of
-from warp_mca.model.stable_step import Elements, StableStep, at_elements, element_steps, stable_step
+from warp_mca.model.stable_step import Elements, at_elements, element_steps, stable_step
 from warp_mca.model.viscosity import thermal_strains, viscosities
-from warp_mca.physics.contact.stiffness import Inertia
-from warp_mca.physics.contact.surfaces import Faces, make_faces
 from warp_mca.physics.elements import Element
 from warp_mca.physics.elements.cells import (
     Cells,
@@ -30,46 +25,31 @@ from warp_mca.physics.elements.cells import (
     sum_to_nodes,
 )
 from warp_mca.physics.elements.patches import compact_order
-from warp_mca.scene import Point, Scene, Surface
-from warp_mca.scene.materials import Material
+from warp_mca.scene import Scene
+from warp_mca.system.block import Block
+from warp_mca.system.bodies import Bodies
+from warp_mca.system.failing import criterion_of, failing_of
+from warp_mca.system.time_step import StableStep
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int32]
 
-GROUND = -1  # stands for the ground, or for no node
-NEAR = 0.05  # distance from a body at which a point may lie, as a share of the body's extent
 
-
-class Assembly:
-    """Concatenated meshes of a scene on the way to a Model.
+class Assembly(Bodies):
+    """Concatenated meshes of a scene on the way to a Model: its `Bodies`, cut into elements.
 
     Attributes:
-        X: positions [m], shape (node_count, 3).
-        cells: the elements by formulation and strain measure.
-        materials: those of the scene; `material` is each element's index among them.
-        K, G: moduli [Pa] of each element; rho: its density [kg/m^3], see `densities`; volume: of its mesh [m^3].
-        face_depth, face_height: of the type of each element, as in `CellType` [-], shape (element_count,).
-        rigid: whether each element belongs to a rigid body, and is not computed, shape (element_count,), bool.
-        mass: lumped masses [kg], shape (node_count,).
+        cells: the elements by formulation and strain measure; `element_mass` are lumped masses of each [kg].
         relief: divisor of each node's mass in eigenvalues [-], shape (node_count,), see `TiedNodes.relief`; None
             where it is 1.
     """
 
     def __init__(self, scene: Scene, meshes: Mapping[str, Mesh], X: Mapping[str, Array]) -> None:
-        self.scene, self.meshes = scene, meshes
-        self.node_start: dict[str, int] = {}
-        self.element_start: dict[str, int] = {}
-        nodes = elements = 0
-        for body in scene.bodies:
-            self.node_start[body.name], self.element_start[body.name] = nodes, elements
-            nodes += len(meshes[body.name].points)
-            elements += meshes[body.name].cell_count
-        self.element_count = elements
+        super().__init__(scene, meshes, X)
+        nodes, elements = len(self.X), self.element_count
         self.relief: Array | None = None
-        self.X = np.concatenate([X[body.name] for body in scene.bodies])
-        self.rigid = np.repeat([b.rigid for b in scene.bodies], [meshes[b.name].cell_count for b in scene.bodies])
         self.cells = self._merged_cells()
-        self.materials: list[Material] = []
+        self.materials = []
         self.material = np.empty(elements, dtype=np.int32)
         for body in scene.bodies:
             for material, cells in body_materials(body, meshes[body.name]):
@@ -189,50 +169,3 @@ class Assembly:
     def elements(self, element: Element, conn: Index, mass: Array, added: Array, index: Index) -> Elements:
         """Elements with their moduli, and with what springs add at their nodes."""
         return Elements(element, self.X, conn, self.K[index], self.G[index], mass, at_elements(conn, added), index)
-
-    def where(self, node: int) -> str:
-        """Body and place of a node, for errors."""
-        body = max((start, name) for name, start in self.node_start.items() if start <= node)[1]
-        x, y, z = self.X[node]
-        return f"{body} at ({x:.4g}, {y:.4g}, {z:.4g}) m"
-
-    def nodes(self, body: str, name: str) -> Index:
-        """Nodes of a set of a body's mesh."""
-        return self.meshes[body].nodes(name) + self.node_start[body]
-
-    def all_nodes(self, body: str) -> slice:
-        """All nodes of a body."""
-        first = self.node_start[body]
-        return slice(first, first + len(self.meshes[body].points))
-
-    @property
-    def inertia(self) -> Inertia:
-        """Masses of the nodes and the elements."""
-        return Inertia(self.mass, self.rho * self.volume)
-
-    def faces(self, surface: Surface) -> Faces:
-        """Boundary faces of a surface."""
-        return self.faces_of(surface.body, *self.meshes[surface.body].surface(surface.nodes))
-
-    def faces_of(self, body: str, node: Index, element: Index) -> Faces:
-        """Faces of a body, whose nodes and elements are those of its mesh."""
-        node = (node + self.node_start[body]).astype(np.int32)
-        element = (element + self.element_start[body]).astype(np.int32)
-        return make_faces(self.X, node, element, self.K, self.G, self.volume * self.face_depth, self.face_height)
-
-    def nearest(self, point: Point | None) -> int:
-        """Node nearest to a point, or GROUND.
-
-        Raises:
-            RequestError: the point lies off the box around its body, by more than NEAR of its extent.
-        """
-        if point is None:
-            return GROUND
-        nodes, at = self.meshes[point.body].points, np.asarray(point.at)
-        lower, upper = nodes.min(axis=0), nodes.max(axis=0)
-        apart = float(np.linalg.norm(at - np.clip(at, lower, upper)))
-        if apart > NEAR * float(np.linalg.norm(upper - lower)):
-            remedy = f"that is {apart:.3g} m off the body; give a point of it in its own frame"
-            raise bad_value(f"Point of {point.body}.at", point.at, remedy)
-        offsets = nodes - at
-        return int(np.argmin((offsets**2).sum(axis=1))) + self.node_start[point.body]

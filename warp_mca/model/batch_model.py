@@ -11,17 +11,17 @@ from numpy.typing import NDArray
 from warp_mca.base.arrays import Index
 from warp_mca.base.errors import bad_value
 from warp_mca.base.joining import join, offsets
-from warp_mca.model.block import Block
-from warp_mca.model.failing import joined
-from warp_mca.model.layout import Layout
-from warp_mca.model.mass_scaling import MassScaling
-from warp_mca.model.model import Model
 from warp_mca.physics.contact.skin_edges import EdgePass, no_edges
-from warp_mca.physics.contact.surfaces import ContactPass
 from warp_mca.physics.loads.nodal import check_batch
-from warp_mca.physics.rigid.body_joints import check_alike
 from warp_mca.scene.contact_laws import DampedPenalty, Penalty
 from warp_mca.scene.loads import ThermalStrain
+from warp_mca.system.block import Block
+from warp_mca.system.body_joints import check_alike
+from warp_mca.system.contact import ContactPass
+from warp_mca.system.failing import joined
+from warp_mca.system.layout import Layout
+from warp_mca.system.model import Model
+from warp_mca.system.time_step import MassScaling
 
 # what the numbers in a model's arrays count, and how many of them a model has
 _COUNTS: dict[str, Callable[[Model], int]] = {

@@ -13,23 +13,24 @@ from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.assembly import Assembly
 from warp_mca.model.damping import greatest_decay, with_damping
 from warp_mca.model.mass_scaling import check_masses, scale_masses
-from warp_mca.model.model import Model
 from warp_mca.model.own_steps import OwnSteps
+from warp_mca.model.rigid_step import bounce_factor, stable_with_rigid
 from warp_mca.model.viscosity import share_of_step, with_viscosity
 from warp_mca.physics.absorbing.nodes import absorbing_nodes
-from warp_mca.physics.contact.auto_penalty import ChosenPenalty
 from warp_mca.physics.contact.axes import contact_axes
 from warp_mca.physics.contact.bonds import Place, on_bonds
 from warp_mca.physics.contact.general import general_passes
 from warp_mca.physics.contact.listed import as_settled, growth, passes_of
-from warp_mca.physics.contact.surfaces import ContactPass
+from warp_mca.physics.contact.surfaces import surface_faces
 from warp_mca.physics.joints.constraints import check_bindings, constraints, free_nodes, join_bodies, nodes_of
 from warp_mca.physics.loads.joint_loads import hinge_loads, movable_bases
-from warp_mca.physics.loads.nodal import LoadedNodes, loaded_nodes
+from warp_mca.physics.loads.nodal import loaded_nodes
 from warp_mca.physics.rigid.bodies import Rigid, check_loads, flexible, own_nodes, rigid_bodies
-from warp_mca.physics.rigid.stable_step import bounce_factor, stable_with_rigid
 from warp_mca.physics.ties.nodes import check_ties, on_faces, tied_nodes, velocities
 from warp_mca.scene import ContactAll, RigidPlane, Scene
+from warp_mca.system.contact import ChosenPenalty, ContactPass
+from warp_mca.system.loads import LoadedNodes
+from warp_mca.system.model import Model
 
 if TYPE_CHECKING:
     from warp_mca.rigid.chain import Chain
@@ -54,8 +55,8 @@ def _contacts(
             passes += [replace(item, decay=decay) for item in found]
             penalties.append(None)
             continue
-        slave = parts.faces(contact.slave)
-        master = None if isinstance(contact.master, RigidPlane) else parts.faces(contact.master)
+        slave = surface_faces(parts, contact.slave)
+        master = None if isinstance(contact.master, RigidPlane) else surface_faces(parts, contact.master)
         contact, chosen = as_settled(parts, contact, slave, master, velocity)
         penalties.append(chosen)
         given, factor = (

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warp_mca.base.arrays import Array
-from warp_mca.model.stable_step import StableStep, with_dashpots
+from warp_mca.model.stable_step import with_dashpots
 from warp_mca.physics.loads.damping import DampedNodes
-from warp_mca.physics.loads.nodal import LoadedNodes
+from warp_mca.system.loads import LoadedNodes
+from warp_mca.system.time_step import StableStep
 
 if TYPE_CHECKING:
     from warp_mca.model.assembly import Assembly

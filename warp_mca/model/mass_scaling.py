@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.model.assembly import Assembly
-from warp_mca.model.stable_step import StableStep, at_elements, exact_or_bound, switching
+from warp_mca.model.stable_step import at_elements, exact_or_bound, switching
 from warp_mca.scene import Scene, Surface
+from warp_mca.system.time_step import MassScaling, StableStep
 
 # Relative error of the first force peak over the mass added where bodies strike, as a share of the lightest of them;
 # measured, see docs/decisions.md.
@@ -21,21 +22,6 @@ LIMIT = 0.1  # estimated error of the first force peak above which mass scaling 
 CLOSE = 1e-3  # relative excess of an eigenvalue that is close enough: half of it in the step
 LONGEST = 100.0  # times the stable step that may be asked for
 ROUNDS = 200  # of adding mass at most
-
-
-@dataclass(frozen=True, kw_only=True)
-class MassScaling:
-    """What mass scaling did to a model.
-
-    Attributes:
-        added: mass that has inertia but no weight, part of `Model.mass` [kg], shape (node_count,), float64.
-        elements: number of elements that gained mass.
-        plain_dt: stable step without [s].
-    """
-
-    added: Array
-    elements: int
-    plain_dt: float
 
 
 def scale_masses(parts: Assembly, contact: Array, plain: StableStep) -> tuple[StableStep, MassScaling | None]:

@@ -19,7 +19,7 @@ from warp_mca.geometry.point_location import LOCATE
 from warp_mca.scene import Line, Path, Scene
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
+    from warp_mca.system.model import Model
 
 
 MAX_PROBES = 100_000  # of a line

@@ -9,7 +9,7 @@ the impulses of slow elements resonate with the vibration of fast ones.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -20,44 +20,13 @@ from warp_mca.base.arrays import Index
 from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.physics.elements import ELEMENTS
 from warp_mca.physics.elements.patches import compact_order
+from warp_mca.system.time_step import Rates
 
 if TYPE_CHECKING:
-    from warp_mca.model.block import Block
-    from warp_mca.model.model import Model
+    from warp_mca.system.block import Block
+    from warp_mca.system.model import Model
 
 Levels = NDArray[np.int64]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Rates:
-    """Levels of a model's nodes and elements; a step of the solver is 2^top substeps.
-
-    Attributes:
-        top: highest level.
-        common: level of all contacts, joints, driven nodes, bases and torques, and of the nodes that they touch.
-        node_level: of each node, shape (node_count,), uint8.
-        elements: number of elements on each level, `top` + 1 of them.
-    """
-
-    top: int
-    common: int
-    node_level: NDArray[np.uint8]
-    elements: tuple[int, ...]
-
-    @property
-    def substeps(self) -> int:
-        """Steps of level 0 in a step of the solver."""
-        return 1 << self.top
-
-    @property
-    def common_steps(self) -> int:
-        """Steps of contacts and joints in a step of the solver."""
-        return 1 << (self.top - self.common)
-
-    @property
-    def work(self) -> int:
-        """Elements computed in a step of the solver."""
-        return sum(count << (self.top - level) for level, count in enumerate(self.elements))
 
 
 def follow(model: Model, level: Levels) -> tuple[Levels, Rates]:

@@ -17,8 +17,8 @@ from warp_mca.geometry.point_location import around_point, weighted_set
 from warp_mca.physics.elements.cells import nodal_masses
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
     from warp_mca.scene import Probe, Scene, Section
+    from warp_mca.system.model import Model
 
 
 CHANNELS = 6  # of a probe, position [m] and velocity [m/s]; of a section, force [N] and moment [N m]

@@ -13,6 +13,7 @@ from warp_mca.base.arrays import Array, Index
 from warp_mca.base.chunks import CHUNK, chunks
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.physics.elements import Element
+from warp_mca.system.time_step import StableStep
 
 BATCH = 256  # elements whose exact eigenvalues are found at a time
 MAX_EXACT = 100 * BATCH  # elements with exact eigenvalues: each 24 x 24 problem takes 50 us
@@ -23,25 +24,6 @@ KEY = np.random.default_rng(0).integers(1, 2**62, 82) | 1  # weights that make o
 
 
 Part = NDArray[np.intp]  # indices of some elements
-
-
-@dataclass(frozen=True)
-class StableStep:
-    """Largest stable step of the model.
-
-    Attributes:
-        dt: 2 / omega_max [s].
-        element: the element that sets it.
-        contact_share: share of omega_max^2 that contact springs add there [-].
-        shortened: how many times shorter than the step of half of the elements it is, contact springs aside [-].
-        damped: how many times shorter than without the stiffness part of the damping of bodies it is [-].
-    """
-
-    dt: float
-    element: int
-    contact_share: float
-    shortened: float
-    damped: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,14 @@ import numpy as np
 from warp_mca.base.arrays import Array
 from warp_mca.base.chunks import CHUNK, chunks
 from warp_mca.base.errors import bad_value
-from warp_mca.model.stable_step import StableStep, with_dashpots
+from warp_mca.model.stable_step import with_dashpots
 from warp_mca.scene.loads import ThermalStrain
+from warp_mca.system.time_step import StableStep
 
 if TYPE_CHECKING:
     from warp_mca.model.assembly import Assembly
-    from warp_mca.model.model import Model
     from warp_mca.physics.elements.cells import Cells
+    from warp_mca.system.model import Model
 
 LARGEST = 0.98  # share of the step that is stable for certain which a viscous model takes at most
 

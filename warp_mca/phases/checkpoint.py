@@ -48,7 +48,7 @@ class Checkpoint:
 
     def is_for(self, impact: Impact, span: float, settings: Settings, method: str) -> None:
         """Say what the run is, `span` [s] of impact: another one does not go on from its file."""
-        from warp_mca.step.state import digest  # which imports Warp, that the command line need not
+        from warp_mca.system.state import digest  # which imports Warp, that the command line need not
 
         ready, solver = impact.ready[0], impact.solver
         self.request = {

@@ -10,7 +10,7 @@ from warp_mca.base.arrays import Index
 from warp_mca.scene import Controller, Scene
 
 if TYPE_CHECKING:
-    from warp_mca.step.state import State
+    from warp_mca.system.state import State
 
 
 class Controls:

@@ -14,6 +14,7 @@ from warp_mca.results.contact_history import ContactHistory
 from warp_mca.results.result import Result, summarise
 from warp_mca.results.sensor_history import sensor_figures
 from warp_mca.watch.mass_report import body_report
+from warp_mca.watch.peaks import greatest_peaks
 
 NOTHING = "no phase of the run touched anything: give a later t_end, or check positions and speeds"
 TOGETHER: dict[str, Callable[[Iterator[Any]], Any]] = {  # how figures of all impacts are made of those of each
@@ -89,6 +90,7 @@ def _of_all(
         "contact_open_at_end": summaries[-1]["contact_open_at_end"],
         "joint_impulse": {name: np.sum([j[name] for j in joints], axis=0).tolist() for name in joints[0]},
         "element_steps_per_s": elements * found["n_steps"] / fe if fe > 0.0 and found["n_steps"] else None,
+        "bodies": greatest_peaks([summary["bodies"] for summary in summaries], offsets),
         "extremes": _extremes([summary["extremes"] for summary in summaries]),
     }
 

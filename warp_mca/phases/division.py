@@ -8,10 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from warp_mca.base.errors import bad_value
-from warp_mca.model.model import Model
 from warp_mca.physics.loads.nodal import load_speed
 from warp_mca.scene import Scene
 from warp_mca.step.steps import Steps
+from warp_mca.system.model import Model
 
 # Speeds may grow to so many times that of the fastest node, or that at which nodes approach each other, before one can
 # outrun the contact search between two passes.

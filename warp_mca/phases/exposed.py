@@ -15,14 +15,15 @@ from warp_mca.base.errors import GuardError
 from warp_mca.geometry.exposure import Exposure
 from warp_mca.model.assembly import Assembly
 from warp_mca.physics.contact.listed import as_settled, passes_of
-from warp_mca.physics.contact.renewal import renew
-from warp_mca.physics.contact.surfaces import ContactPass, Faces
+from warp_mca.physics.contact.surfaces import faces_of, surface_faces
 from warp_mca.scene import Contact, RigidPlane, Surface
+from warp_mca.step.contact_renewal import renew
+from warp_mca.system.contact import ContactPass, Faces
 
 if TYPE_CHECKING:
     from warp_mca.phases.prepare import Prepared
     from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.state import State
 
 Mask = NDArray[np.bool_]
 
@@ -47,7 +48,7 @@ class Exposed:
 
     def _settled(self, contact: Contact) -> Contact:
         slave, master = (
-            None if isinstance(surface, RigidPlane) else self._parts.faces(surface)
+            None if isinstance(surface, RigidPlane) else surface_faces(self._parts, surface)
             for surface in (contact.slave, contact.master)
         )
         assert slave is not None
@@ -119,13 +120,13 @@ class Exposed:
     def _surface(self, surface: Surface, alive: Mask) -> Faces:
         body = surface.body
         if body not in self._faces:
-            return self._parts.faces(surface)
+            return surface_faces(self._parts, surface)
         node, element = self._faces[body].surface(surface.nodes, self._own(body, alive))
         if not len(node):
             raise GuardError(
                 f"all elements at the surface {surface.nodes} of body {body} have failed; end the run before"
             )
-        return self._parts.faces_of(body, node, element)
+        return faces_of(self._parts, body, node, element)
 
     def _passes(self, alive: Mask) -> tuple[ContactPass, ...]:
         found: list[ContactPass] = []

@@ -12,8 +12,8 @@ from warp_mca.base.progress import duration_words
 from warp_mca.phases.rate_groups import cost_of
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
     from warp_mca.phases.impact import Impact
+    from warp_mca.system.model import Model
 
 SPEED_UP = 0.65  # power of the number of threads with which elements go faster; measured on up to 16
 DOUBLE = {"cpu": 1.6, "cuda": 1.7}  # time of an element in float64 over that in mixed

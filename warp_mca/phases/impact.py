@@ -24,11 +24,11 @@ from warp_mca.phases.initial_overlap import settle_initial_overlap
 from warp_mca.phases.scene_run import SceneRun
 from warp_mca.physics.floating.frames import with_floating_frames
 from warp_mca.step.output import Output
-from warp_mca.step.records import SceneRecords
 from warp_mca.step.sensor_stage import SensorStage
 from warp_mca.step.solver import Solver
-from warp_mca.step.state import State
 from warp_mca.step.steps import Steps
+from warp_mca.system.records import SceneRecords
+from warp_mca.system.state import State
 from warp_mca.watch.passing import Watch
 
 if TYPE_CHECKING:
@@ -138,7 +138,8 @@ class Impact:
         self.state.save(path, self.solver.model, self.solver.dt, more)
 
     def divide_anew(self, steps: Steps) -> list[SceneRecords]:
-        """Go on with other intervals of the same time step: rows begin anew, energies and extremes go on.
+        """Go on with other intervals of the same time step: rows and peaks of stress begin anew, energies and extremes
+        go on.
 
         Returns:
             What each scene has recorded so far.
@@ -146,6 +147,8 @@ class Impact:
         earlier = self.state.scenes
         self.state.scenes = [records.without_rows(self.state.steps * self.solver.dt) for records in earlier]
         self.state.steps = 0
+        for own in self.state.elements:
+            own.peak.zero_()
         self.take(steps)
         return earlier
 

@@ -23,8 +23,8 @@ from warp_mca.phases.return_to_rigid import return_to_rigid
 from warp_mca.physics.elements.cells import body_materials
 from warp_mca.rigid.placement import link_placements
 from warp_mca.step.solver import Solver
-from warp_mca.step.state import State
-from warp_mca.step.workspace import ROWS
+from warp_mca.system.state import State
+from warp_mca.system.workspace import ROWS
 
 Array = NDArray[np.float64]
 ByBody = dict[str, Array]

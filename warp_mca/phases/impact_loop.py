@@ -9,10 +9,10 @@ import warp as wp
 
 from warp_mca.base.errors import GuardError
 from warp_mca.phases.controls import Controls
-from warp_mca.step.stage import Search
 from warp_mca.step.steps import Part
 from warp_mca.step.transfer import Transfer
-from warp_mca.step.workspace import ROWS
+from warp_mca.system.stage import Search
+from warp_mca.system.workspace import ROWS
 from warp_mca.watch.looks import Looks
 
 if TYPE_CHECKING:

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
     from warp_mca.phases.prepare import Prepared
     from warp_mca.physics.contact.stage import ContactStage
-    from warp_mca.physics.contact.surfaces import ContactPass
     from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.contact import ContactPass
+    from warp_mca.system.state import State
 
 Array = NDArray[np.float64]
 

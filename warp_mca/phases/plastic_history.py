@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.model.model import Model
 from warp_mca.step.solver import Solver
-from warp_mca.step.state import State
+from warp_mca.system.model import Model
+from warp_mca.system.state import State
 
 Array = NDArray[np.float64]
 

@@ -13,9 +13,7 @@ from numpy.typing import NDArray
 
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.build import build_model
-from warp_mca.model.model import Model
 from warp_mca.model.paths import Found, Probes, locate
-from warp_mca.model.precision import check_range
 from warp_mca.model.sensors import NO_SENSORS, Sensors, locate_sensors
 from warp_mca.phases.arguments import Progress
 from warp_mca.phases.meshing import mesh
@@ -27,6 +25,8 @@ from warp_mca.rigid.chain import Array, Chain
 from warp_mca.rigid.handoff import HandOff, hand_off
 from warp_mca.rigid.placement import Placement
 from warp_mca.scene import RigidPhase, Scene, Surface
+from warp_mca.system.model import Model
+from warp_mca.system.precision import check_range
 from warp_mca.watch.table import told_before
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from warp_mca.phases.prepare import Prepared
     from warp_mca.physics.contact.stage import ContactStage
     from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.state import State
 
 CROSSINGS = 6.0  # times in which waves cross the longer body while springs of a press fit come to their full force
 LEAST_STEPS = 60  # of these

@@ -12,14 +12,15 @@ from typing import TYPE_CHECKING
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.model.own_steps import OwnSteps
-from warp_mca.model.rates import Levels, Rates, follow, grouped
+from warp_mca.model.rates import Levels, follow, grouped
 from warp_mca.phases.division import divide
 from warp_mca.physics.contact.resting import undamped
+from warp_mca.system.time_step import Rates
 
 if TYPE_CHECKING:
     from warp_mca.model.build import Grouping
-    from warp_mca.model.model import Model
     from warp_mca.scene import Scene
+    from warp_mca.system.model import Model
 
 MOST = 8  # groups: steps differ by 2^7 then
 

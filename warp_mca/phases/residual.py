@@ -14,13 +14,13 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warp_mca.model.assembly import GROUND
-from warp_mca.model.model import Model
 from warp_mca.phases.settings import Settings
 from warp_mca.physics.rigid.bodies import moves_with_rigid
 from warp_mca.rigid.equilibrium import TOLERANCE, equilibrium
 from warp_mca.step.solver import Solver
-from warp_mca.step.state import State
+from warp_mca.system.bodies import GROUND
+from warp_mca.system.model import Model
+from warp_mca.system.state import State
 
 Array = NDArray[np.float64]
 

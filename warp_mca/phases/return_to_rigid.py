@@ -19,7 +19,7 @@ from warp_mca.rigid.placement import Placement
 from warp_mca.rigid.scene_chain import pins
 from warp_mca.step.output import NodalStress
 from warp_mca.step.solver import Solver
-from warp_mca.step.state import State
+from warp_mca.system.state import State
 
 Array = NDArray[np.float64]
 ByBody = dict[str, Array]

@@ -32,14 +32,15 @@ from warp_mca.watch.failure_report import failure_report
 from warp_mca.watch.ledger import Ledger
 from warp_mca.watch.looks import SceneLooks
 from warp_mca.watch.mass_report import body_report, mass_report
+from warp_mca.watch.peaks import peak_report
 from warp_mca.watch.row import Context, Finished, SpringShare
 from warp_mca.watch.table import told_at_the_end
 
 if TYPE_CHECKING:
     from warp_mca.phases.prepare import Prepared
     from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
     from warp_mca.step.steps import Steps
+    from warp_mca.system.state import State
     from warp_mca.watch.passing import Watch
 
 Array = NDArray[np.float64]
@@ -176,7 +177,7 @@ class SceneRun:
             more |= rate_figures(model.rates, self.steps.dt, count, wall)
         if self.solver.layout.count > 1:
             more["batch"] = {"scene": self.index, "scenes": self.solver.layout.count}
-        more |= {"bodies": body_report(scene.bodies, self.ready.meshes, scene.masses), **mass_report(scene, model)}
+        more |= {"bodies": self._bodies(), **mass_report(scene, model)}
         if ledger.absorbs:
             more["absorbed_impulse"] = self.solver.absorbing.impulses(self.state, self.index)
         if any(model.penalties):
@@ -216,6 +217,13 @@ class SceneRun:
             theta_dot=start.angles(start.theta_dot).tolist(),
             **more,
         )
+
+    def _bodies(self) -> dict[str, dict[str, Any]]:
+        """Mass of each body, and its greatest stress and plastic strain."""
+        scene, meshes = self.ready.scene, self.ready.meshes
+        masses = body_report(scene.bodies, meshes, scene.masses)
+        peaks = peak_report(scene, meshes, self.solver, self.state, self.index, self.steps)
+        return {name: {**masses[name], **peaks.get(name, {})} for name in masses}
 
     def _hand_off(self) -> dict[str, object]:
         """How well rigid links and their nodes agree at the start, and the way of a base that slides."""

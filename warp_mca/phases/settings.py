@@ -37,6 +37,6 @@ def settings_of(device: str, precision: str, threads: int | None, multi_rate: ob
         RequestError: there is no such device, or no such number of threads or rates.
     """
     from warp_mca.step.device import check_device
-    from warp_mca.step.threads import thread_count
+    from warp_mca.system.threads import thread_count
 
     return Settings(check_device(device), precision, thread_count(threads), check_multi_rate(multi_rate))

@@ -26,7 +26,7 @@ from warp_mca.scene import DampedPenalty, Settle
 if TYPE_CHECKING:
     from warp_mca.phases.impact import Impact
     from warp_mca.phases.scene_run import SceneRun
-    from warp_mca.step.state import State
+    from warp_mca.system.state import State
 
 Array = NDArray[np.float64]
 STEPS = 10  # between two looks at the kinetic energy at most

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from warp_mca.phases.history_rows import Rows, phase_facts, rows_of
-from warp_mca.step.records import SceneRecords
 from warp_mca.step.steps import Steps
+from warp_mca.system.records import SceneRecords
 from warp_mca.watch.ledger import Ledger
 
 if TYPE_CHECKING:

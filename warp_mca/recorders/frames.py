@@ -27,9 +27,9 @@ from warp_mca.step.transfer import SLOTS, Transfer
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
-    from warp_mca.model.block import Block
-    from warp_mca.model.model import Model
     from warp_mca.step.output import Output
+    from warp_mca.system.block import Block
+    from warp_mca.system.model import Model
 
 
 # Frames on their way from a GPU, which goes on meanwhile: while recorders start, or save their files.

@@ -24,8 +24,8 @@ from warp_mca.scene.elements import ELEMENTS
 if TYPE_CHECKING:
     import meshio
 
-    from warp_mca.model.model import Model
     from warp_mca.recorders.recorder import Frame, RunInfo
+    from warp_mca.system.model import Model
 
 USUAL = "name a .vtu, .vtk, .xdmf, .med or .msh file"
 # Formats whose readers take six components as xx, yy, zz, xy, yz, xz; XDMF's take yy as the fourth, gmsh takes none.

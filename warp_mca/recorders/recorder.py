@@ -19,8 +19,8 @@ from warp_mca.scene import RigidPlane
 from warp_mca.step.shown import CONTACT, NEEDS, PATHS, SURFACE, VOLUME, SurfaceMesh  # noqa: F401, read from here
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
     from warp_mca.scene import Scene
+    from warp_mca.system.model import Model
 
 Float = NDArray[np.float32]
 

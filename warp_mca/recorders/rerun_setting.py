@@ -14,8 +14,8 @@ from warp_mca.recorders.rerun_blueprint import PATH_COLOURS, Sights
 if TYPE_CHECKING:
     import rerun as rr
 
-    from warp_mca.physics.contact.surfaces import ContactPass
     from warp_mca.recorders.recorder import RunInfo
+    from warp_mca.system.contact import ContactPass
 
 PLANES = "/world/planes"
 TO_MM = 1e3

@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 
     import h5py
 
-    from warp_mca.model.model import Model
     from warp_mca.recorders.recorder import Frame, RunInfo
     from warp_mca.scene import Scene
+    from warp_mca.system.model import Model
 
     _Datasets = dict[str, h5py.Dataset]
 

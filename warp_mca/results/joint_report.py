@@ -11,11 +11,11 @@ from warp_mca.base.arrays import Array
 from warp_mca.kernels.nodes.joint_arrays import SLIDE
 
 if TYPE_CHECKING:
-    from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.actor import System
+    from warp_mca.system.state import State
 
 
-def joint_reports(solver: Solver, state: State, scene: int, history: Mapping[str, Array]) -> dict[str, Any]:
+def joint_reports(solver: System, state: State, scene: int, history: Mapping[str, Array]) -> dict[str, Any]:
     """By joint: greatest force, moment and drive torques, each with unit and time [s], and the freedoms at the end.
 
     Args:

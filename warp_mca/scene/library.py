@@ -2,14 +2,15 @@
 
 `SOURCES` says of each where its parameters are from, and for what they were measured. Elastic constants are those of
 handbooks where the source has none. Parameters of one's own lot and temper are better than any of these: yield stresses
-of one grade differ by 10 to 20 %.
+of one grade differ by 10 to 20 %, moduli of polymers, rubber and foam by more.
 """
 
 from __future__ import annotations
 
 from warp_mca.scene.elastic import Elastic
-from warp_mca.scene.metals import JohnsonCook
-from warp_mca.scene.rubbers import Ogden
+from warp_mca.scene.foams import CrushableFoam
+from warp_mca.scene.metals import CowperSymonds, J2Bilinear, JohnsonCook
+from warp_mca.scene.rubbers import NeoHookean, Ogden
 
 _JC83 = (
     "Johnson and Cook, Proc. 7th Int. Symp. Ballistics (1983) 541: torsion to 400 1/s, tension by Hopkinson bar to "
@@ -52,8 +53,26 @@ ALUMINIUM_7075_T651 = JohnsonCook(
 STEEL_A36 = JohnsonCook(
     E=200e9, nu=0.26, rho=7850.0, A=286.1e6, B=500.1e6, n=0.2282, C=0.022, m=0.917, T_melt=1773.0, c_p=486.0
 )
+STEEL_304 = JohnsonCook(
+    E=200e9, nu=0.29, rho=7900.0, A=310e6, B=1000e6, n=0.65, C=0.07, m=1.0, T_melt=1673.0, c_p=500.0
+)
+STEEL_S235 = CowperSymonds(
+    E=210e9, nu=0.3, rho=7850.0, plastic_strain=(0.0, 0.015, 0.2), stress=(235e6, 240e6, 430e6), D=40.4, q=5.0
+)
+POLYCARBONATE = J2Bilinear(E=2.4e9, nu=0.38, rho=1200.0, sigma_y=65e6, E_t=0.0)
+ABS = J2Bilinear(E=2.3e9, nu=0.37, rho=1040.0, sigma_y=45e6, E_t=0.0)
+PA66_DRY = J2Bilinear(E=3.1e9, nu=0.39, rho=1140.0, sigma_y=85e6, E_t=0.0)
+PA66_MOIST = J2Bilinear(E=1.2e9, nu=0.41, rho=1140.0, sigma_y=52e6, E_t=0.0)
+EPDM_60 = NeoHookean(C10=0.6e6, rho=1150.0)
+EPP_30 = CrushableFoam(
+    E=4e6, rho=30.0, crush=(0.0, 0.25, 0.5, 0.75), stress=(0.09e6, 0.15e6, 0.21e6, 0.47e6), tension=0.4e6
+)
 NATURAL_RUBBER = Ogden(mu=(0.63e6, 0.0012e6, -0.01e6), alpha=(1.3, 5.0, -2.0), rho=930.0)
 
+_GRADES = (
+    "between data sheets of unfilled grades for moulding, by ISO 527 at 23 degrees C: slow tension up to the yield "
+    "point, where necking begins; at 100 1/s the yield stress is 20 to 40 % higher"
+)
 SOURCES: dict[str, str] = {
     **dict.fromkeys(
         "OFHC_COPPER CARTRIDGE_BRASS NICKEL_200 ARMCO_IRON STEEL_1006 STEEL_4340 STEEL_S7 ALUMINIUM_2024_T351 "
@@ -67,6 +86,17 @@ SOURCES: dict[str, str] = {
     "NATURAL_RUBBER": "Ogden, Proc. R. Soc. A 326 (1972) 565, fitted to Treloar, Trans. Faraday Soc. 40 (1944) 59: "
     "vulcanised with 8 % of sulphur, without filler, slow tension to 7.6 times its length, equal tension of two axes "
     "to 4.5, shear; the bulk modulus is that of the default nu, lower than the real one",
+    "STEEL_304": "Frontan and others, Acta Mater. 60 (2012) 1353: annealed, rates of ballistic impacts",
+    "STEEL_S235": "EN 10025-2: least yield stress, and tensile strength as true stress at the least uniform strain; "
+    "rates after Cowper and Symonds (1957) for mild steel, small strains",
+    "POLYCARBONATE": _GRADES,
+    "ABS": _GRADES,
+    "PA66_DRY": f"{_GRADES}; dry as moulded",
+    "PA66_MOIST": f"{_GRADES}; in balance with air of 50 % humidity",
+    "EPDM_60": "Young's modulus 3.6 MPa of 60 Shore A by Gent, Trans. Inst. Rubber Ind. 34 (1958) 46: slow, to 1.5 "
+    "times the length",
+    "EPP_30": "between data sheets of expanded polypropylene of 30 kg/m^3, by ISO 844 at 25, 50 and 75 %: slow; at "
+    "100 1/s some 30 % stronger",
     "STEEL_A36": "Schwer, 6th European LS-DYNA Users' Conference (2007), after Seidt and others: to 2000 1/s",
 }
 

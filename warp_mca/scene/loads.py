@@ -70,7 +70,7 @@ class Load:
     def build(self, assembly: Any, start: float) -> Any:
         """Its arrays, a `physics.loads.nodal.LoadedNodes`, for a phase that starts so long after the release [s].
 
-        `assembly` is the `model.assembly.Assembly` of the scene, with its meshes and masses.
+        `assembly` is the `system.bodies.Bodies` of the scene, with its meshes and masses.
 
         Raises:
             RequestError: it cannot act so.

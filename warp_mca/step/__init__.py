@@ -1,1 +1,1 @@
-"""Owns the small timescale: time step, stages, threads."""
+"""Owns the small timescale: Solver, order of the stages, records, graphs."""

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.physics.absorbing.stage import AbsorbingStage
-from warp_mca.physics.actor import Actor
 from warp_mca.physics.contact.actor import Contacts
 from warp_mca.physics.elements.actor import Elements
 from warp_mca.physics.floating.stage import FloatingStage
@@ -22,10 +21,11 @@ from warp_mca.scene.loads import LOADS
 from warp_mca.step.node_stage import NodeStage
 from warp_mca.step.rated_nodes import node_stage
 from warp_mca.step.record_stage import RecordStage
+from warp_mca.system.actor import Actor, System
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
     from warp_mca.step.solver import Solver
+    from warp_mca.system.model import Model
 
 ACTORS: dict[str, Callable[[Solver], Actor]] = {
     "elements": Elements,
@@ -54,14 +54,9 @@ def actors_of(model: Model) -> dict[str, Callable[[Solver], Actor]]:
     return ACTORS | {kind: partial(stage, name=kind) for kind, stage in stages.items()}
 
 
-class Made:
-    """Actors as attributes by their names, each made at its first use: whatever it reads of others is made before it.
+class Made(System):
+    """The actors of ACTORS by their names, with their types."""
 
-    Attributes:
-        kinds: what makes them, by name.
-    """
-
-    kinds: dict[str, Callable[[Solver], Actor]]
     elements: Elements
     contacts: Contacts
     constraints: ConstraintStage
@@ -73,11 +68,3 @@ class Made:
     floating: FloatingStage
     nodes: NodeStage
     records: RecordStage
-
-    def __getattr__(self, name: str) -> Any:
-        """An actor, which stays."""
-        kinds = self.__dict__.get("kinds", {})
-        if name not in kinds:
-            raise AttributeError(name)
-        self.__dict__[name] = found = kinds[name](self)
-        return found

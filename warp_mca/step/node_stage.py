@@ -10,16 +10,16 @@ import warp as wp
 
 from warp_mca.kernels.nodes import constraint, node, slide
 from warp_mca.kernels.nodes.gather import Kind, NodeData, NodeState
-from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.contact.per_scene import per_scene
 from warp_mca.physics.elements.stage import BLOCK_DIM
-from warp_mca.physics.loads.weight import nodal_gravity
-from warp_mca.step.stage import Stage, Step
-from warp_mca.step.threads import NODES, Split, whole
+from warp_mca.system.actor import Actor, When
+from warp_mca.system.stage import Stage, Step
+from warp_mca.system.threads import NODES, Split, whole
+from warp_mca.system.weight import nodal_gravity
 
 if TYPE_CHECKING:
     from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.state import State
 
 # Patches that a block of threads computes in turn, from which on blocks take their places while nodes are advanced:
 # they do not spread evenly then, and few rounds do not level that out.

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from warp_mca.kernels.records import output
 from warp_mca.model.paths import Probes
 from warp_mca.step.shown import CONTACT, PATHS, SURFACE, VOLUME, SurfaceMesh
-from warp_mca.step.workspace import ROWS
+from warp_mca.system.workspace import ROWS
 
 if TYPE_CHECKING:
     from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.state import State
 
 
 class NodalStress:

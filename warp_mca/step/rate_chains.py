@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import warp as wp
 
-from warp_mca.step.stage import Group, Step, Streams
 from warp_mca.step.step_groups import chain_groups
+from warp_mca.system.stage import Group, Step, Streams
 
 if TYPE_CHECKING:
     from warp_mca.step.solver import Solver

@@ -13,17 +13,17 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import bad_value
 from warp_mca.kernels.nodes import node
 from warp_mca.kernels.nodes.gather import LEVEL_BIT
-from warp_mca.physics.actor import When
 from warp_mca.physics.elements.stage import list_slots
 from warp_mca.step.node_stage import NodeStage
-from warp_mca.step.stage import Stage
-from warp_mca.step.threads import Split, whole
+from warp_mca.system.actor import When
+from warp_mca.system.stage import Stage
+from warp_mca.system.threads import Split, whole
 
 if TYPE_CHECKING:
-    from warp_mca.model.rates import Rates
     from warp_mca.physics.elements.stage import ElementStage
     from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.state import State
+    from warp_mca.system.time_step import Rates
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,10 @@ import warp as wp
 
 from warp_mca.kernels.elements.failure import sum_failed_kernel
 from warp_mca.kernels.records import ledger, output
-from warp_mca.model.columns import FAILURE, added_columns
-from warp_mca.physics.actor import Actor, When
-from warp_mca.step.stage import BESIDE, LAST, MAIN, SHOWN, Stage, Step
-from warp_mca.step.workspace import ROWS
+from warp_mca.system.actor import Actor, When
+from warp_mca.system.columns import FAILURE, added_columns
+from warp_mca.system.stage import BESIDE, LAST, MAIN, SHOWN, Stage, Step
+from warp_mca.system.workspace import ROWS
 
 if TYPE_CHECKING:
     from warp_mca.step.output import Output

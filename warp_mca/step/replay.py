@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import warp as wp
 
 from warp_mca.step.early_launch import launch_early, launch_together
-from warp_mca.step.threads import Pool, Split, Stages, flushing
+from warp_mca.system.threads import Pool, Split, Stages, flushing
 
 if TYPE_CHECKING:
-    from warp_mca.step.state import State
+    from warp_mca.system.state import State
 
 MOST = 2000  # steps in one graph
 FEW = 12  # where a GPU waits for it to be captured, or where few rows are alike

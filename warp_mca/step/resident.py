@@ -28,11 +28,11 @@ from warp_mca.kernels.resident.pin_role import MOST_PINNED
 from warp_mca.kernels.resident.steps import Roles, resident_kernel
 from warp_mca.physics.contact.stage import ContactStage
 from warp_mca.physics.elements.patch_stage import PatchStage
-from warp_mca.physics.loads.weight import nodal_gravity
+from warp_mca.system.weight import nodal_gravity
 
 if TYPE_CHECKING:
     from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.state import State
 
 STAGES = {
     "nodes in floating frames",

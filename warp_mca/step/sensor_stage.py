@@ -19,18 +19,18 @@ from numpy.typing import NDArray
 from warp_mca.base.arrays import Index
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.records import sensors as kernels
-from warp_mca.model.block import Block
 from warp_mca.model.sensors import CHANNELS, Cut, Sensors, Spot
 from warp_mca.physics.elements import ELEMENTS
 from warp_mca.physics.elements.failing import silence
 from warp_mca.physics.elements.state import ElementState
-from warp_mca.step.workspace import ROWS
+from warp_mca.system.block import Block
+from warp_mca.system.workspace import ROWS
 
 if TYPE_CHECKING:
     from warp_mca.physics.elements.stage import ElementStage
     from warp_mca.step.solver import Solver
-    from warp_mca.step.stage import Step
-    from warp_mca.step.state import State
+    from warp_mca.system.stage import Step
+    from warp_mca.system.state import State
 
 
 class SensorStage:

@@ -17,24 +17,24 @@ import warp as wp
 from warp_mca.base.errors import bad_value
 from warp_mca.kernels.contact.search import FLAGS
 from warp_mca.kernels.hardware import subnormals
-from warp_mca.model.layout import layout_of
-from warp_mca.model.model import Model
-from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.contact.stage import has_sides
 from warp_mca.physics.elements.stage import gather_lists
 from warp_mca.step.actors import Made, actors_of
 from warp_mca.step.device import check_device
 from warp_mca.step.rate_chains import Chains
-from warp_mca.step.records import SceneRecords
 from warp_mca.step.replay import MOST, Replay
 from warp_mca.step.resident import resident
 from warp_mca.step.sensor_stage import SensorStage
-from warp_mca.step.stage import Search, Step, Streams
-from warp_mca.step.state import State
 from warp_mca.step.step_groups import step_groups, substep
-from warp_mca.step.threads import ELEMENTS as RANGE
-from warp_mca.step.threads import Split, whole
-from warp_mca.step.workspace import Workspace
+from warp_mca.system.actor import Actor, When
+from warp_mca.system.layout import layout_of
+from warp_mca.system.model import Model
+from warp_mca.system.records import SceneRecords
+from warp_mca.system.stage import Search, Step, Streams
+from warp_mca.system.state import State
+from warp_mca.system.threads import ELEMENTS as RANGE
+from warp_mca.system.threads import Split, whole
+from warp_mca.system.workspace import Workspace
 
 if TYPE_CHECKING:
     from warp_mca.step.output import Output
@@ -46,11 +46,6 @@ class Solver(Made):
     """Advances states of a model on one device; it owns nothing that changes from step to step.
 
     Attributes:
-        model: that it advances.
-        layout: of the model's scenes.
-        dt: time step [s]; with `Model.rates` that of their substeps together.
-        threads: that compute; one on a GPU, and for a model that is too small to gain from more.
-        common_dt: time step of contacts and joints [s].
         actors: all that acts, in the order of `step.actors.actors_of`.
         output: what is read off the state for paths and recorders, or None.
         sensors: probes and sections.

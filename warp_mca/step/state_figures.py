@@ -13,7 +13,7 @@ from warp_mca.base.rotation import rotation_vector
 if TYPE_CHECKING:
     from warp_mca.model.model import Model
     from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.state import State
 
 
 def max_plastic_strain(solver: Solver, state: State, scene: int = 0) -> float:

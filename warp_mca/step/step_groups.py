@@ -9,11 +9,11 @@ from collections.abc import Sequence
 from itertools import chain
 from typing import TYPE_CHECKING
 
-from warp_mca.physics.actor import Actor, When
+from warp_mca.system.actor import Actor, When
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
-    from warp_mca.step.stage import Group
+    from warp_mca.system.model import Model
+    from warp_mca.system.stage import Group
 
 # Places of stages in their order. Those of a line may overlap on a GPU where they stand in different streams; one line
 # follows the other. Elements do not go with the frames that they compute in, because contact would begin before them,

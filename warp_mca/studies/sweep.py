@@ -21,7 +21,6 @@ from warp_mca.phases.rate_groups import check_multi_rate
 from warp_mca.results.storage import check_output, folder_path
 from warp_mca.scene import Scene
 from warp_mca.scene.options import with_options
-from warp_mca.step.threads import thread_count
 from warp_mca.studies.sweep_columns import parameter_column
 from warp_mca.studies.sweep_job import Job, Row, failure, run_job
 from warp_mca.studies.sweep_plan import Plan, RunOptions, batches, differing
@@ -36,6 +35,7 @@ from warp_mca.studies.sweep_workers import (
     own_workers,
     worker_count,
 )
+from warp_mca.system.threads import thread_count
 
 TRIES = 5  # of a run whose worker ends before it
 LATE = "not begun before the deadline; the same call goes on with it"

@@ -263,7 +263,7 @@ def worker_count(options: RunOptions, workers: int | None) -> int:
     Raises:
         RequestError: there is no such device.
     """
-    from warp_mca.step.threads import thread_count
+    from warp_mca.system.threads import thread_count
 
     devices = devices_named(options.device)
     usual = len(devices) if devices != ["cpu"] else max(1, thread_count(None) // (options.threads or 1))

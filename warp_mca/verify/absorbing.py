@@ -13,7 +13,7 @@ from warp_mca.phases.carry_out import begin
 from warp_mca.phases.prepare import Request, prepare
 from warp_mca.phases.settings import Settings
 from warp_mca.step.solver import Solver
-from warp_mca.step.state import State
+from warp_mca.system.state import State
 from warp_mca.verify.case import SHAPES, Row, Setup, case
 
 Array = NDArray[np.float64]

@@ -20,8 +20,8 @@ from warp_mca.watch.bent_cells import BENT, COLUMNS, FLOW, FLOWING, MISSED, RIGH
 from warp_mca.watch.row import Array, Finished, Values, When, row
 
 if TYPE_CHECKING:
-    from warp_mca.model.block import Block
-    from warp_mca.model.model import Model
+    from warp_mca.system.block import Block
+    from warp_mca.system.model import Model
 
 # Error of deflections from which on a word is said. Of two bodies that strike, forces and times go with the root of the
 # stiffness at most; strains of wedges and tet4 jump where they are not bent, too.

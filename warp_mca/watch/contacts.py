@@ -15,8 +15,8 @@ from warp_mca.scene import RigidPlane
 from warp_mca.watch.row import Array, Finished, Values, listed_passes, row
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
-    from warp_mca.physics.contact.surfaces import ContactPass
+    from warp_mca.system.contact import ContactPass
+    from warp_mca.system.model import Model
 
 PATCH = 6.0  # nodes that carry a Hertzian contact three cells across: 8 / 9 of pi / 4 times 3 squared
 POINT = 2.5  # nodes that carry a flat contact at least; fewer are a corner, or an edge of one cell

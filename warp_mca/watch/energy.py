@@ -17,7 +17,7 @@ from warp_mca.watch.row import Context, Finished, SpringShare, Values, row, side
 from warp_mca.watch.vibration import impedance, shadow
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
+    from warp_mca.system.model import Model
     from warp_mca.watch.ledger import Ledger
 
 # Relative loss of the force peak of a curved contact over the share of the exchanged energy that springs hold then;

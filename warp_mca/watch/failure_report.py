@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
     from warp_mca.scene import Scene
     from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.state import State
 
 
 def failure_report(

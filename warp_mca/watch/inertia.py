@@ -19,15 +19,15 @@ from warp_mca.geometry.cell_types import CELL_TYPES, HEXAHEDRON, TETRA10, linear
 from warp_mca.geometry.hexahedron import CORNERS, shape_functions
 from warp_mca.geometry.quality import volumes
 from warp_mca.geometry.shape_volume import of_cells
-from warp_mca.model.assembly import GROUND
 from warp_mca.physics.elements.cells import body_cells, densities
 from warp_mca.rigid.body_motion import held_axes
+from warp_mca.system.bodies import GROUND
 from warp_mca.watch.row import Array, Finished, Values, row
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
-    from warp_mca.model.model import Model
     from warp_mca.scene import Body
+    from warp_mca.system.model import Model
 
 TURNING = 1e-2  # energy of the rotation over twice that of the motion, below which inertia does not matter
 ROCKING = 1e-3  # the same over weight times size: bodies at rest rock on their contact springs

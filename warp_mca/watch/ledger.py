@@ -33,15 +33,15 @@ from warp_mca.kernels.records.columns import (
     STRAIN,
     VISCOUS,
 )
-from warp_mca.model.columns import added_columns, column_count
 from warp_mca.model.viscosity import thermal_energy
-from warp_mca.step.records import SceneRecords
+from warp_mca.system.columns import added_columns, column_count
+from warp_mca.system.records import SceneRecords
 from warp_mca.watch.guards import Reading, stop
 from warp_mca.watch.row import When
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
     from warp_mca.step.steps import Steps
+    from warp_mca.system.model import Model
 
 Array = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from warp_mca.watch.bent_cells import Array, Cells
 
 if TYPE_CHECKING:
     from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.state import State
     from warp_mca.watch.ledger import Ledger
     from warp_mca.watch.passing import Watch
 

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from warp_mca.geometry.mesh import Mesh
-    from warp_mca.model.model import Model
     from warp_mca.scene import Body, PointMass, Scene
+    from warp_mca.system.model import Model
 
 
 def body_report(

@@ -16,9 +16,9 @@ import numpy as np
 
 from warp_mca.base.arrays import Index
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.model.model import Model
-from warp_mca.physics.contact.surfaces import ContactPass
 from warp_mca.scene import Scene
+from warp_mca.system.contact import ContactPass
+from warp_mca.system.model import Model
 from warp_mca.watch.passing_cases import SLACK, BelowPlane, Case, Look, WithinBody, WithinItself, cases_of
 from warp_mca.watch.row import Array, Finished, Values, When, row
 from warp_mca.watch.skins import Skin

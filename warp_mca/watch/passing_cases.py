@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from warp_mca.base.arrays import Array, Index
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.model.model import Model
 from warp_mca.scene import RigidPlane, Scene
+from warp_mca.system.model import Model
 from warp_mca.watch.row import listed_passes
 from warp_mca.watch.skins import NOWHERE, Found, Skin, crossed
 

@@ -13,11 +13,11 @@ from warp_mca.scene import Contact, ContactAll, RigidPlane
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
-    from warp_mca.model.model import Model
-    from warp_mca.physics.contact.surfaces import ContactPass
     from warp_mca.results.contact_history import ContactHistory
     from warp_mca.rigid.handoff import HandOff
     from warp_mca.scene import Scene
+    from warp_mca.system.contact import ContactPass
+    from warp_mca.system.model import Model
     from warp_mca.watch.ledger import Ledger
     from warp_mca.watch.passing import Watch
 

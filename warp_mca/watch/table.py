@@ -26,8 +26,8 @@ from warp_mca.watch.row import Context, Finished, Row, When
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
-    from warp_mca.model.model import Model
     from warp_mca.scene import Scene
+    from warp_mca.system.model import Model
 
 
 def _rows(*modules: ModuleType) -> tuple[Row, ...]:

@@ -15,8 +15,8 @@ from warp_mca.physics.elements.cells import body_materials
 from warp_mca.watch.row import Array, Context, Finished, Values, listed_passes, row, sides_of
 
 if TYPE_CHECKING:
-    from warp_mca.physics.contact.surfaces import ContactPass
     from warp_mca.scene import Contact
+    from warp_mca.system.contact import ContactPass
 
 MEAN = 5  # rows whose mean is what the surface does besides
 SPAN = 20  # rows, all in contact, that vibrate

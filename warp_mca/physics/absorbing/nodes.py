@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import ClassVar
-
 import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
-from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.base.rotation import rotation_matrix
-from warp_mca.model.assembly import GROUND, Assembly
 from warp_mca.scene.absorbing import Absorbing
+from warp_mca.system.absorbing import AbsorbingNodes
+from warp_mca.system.bodies import GROUND, Bodies
 
 TRANSLATION = 1e-9  # spread of a body's velocities, as a share of the greatest, up to which it translates
 # Stiffness of the springs over G / R, across the boundary and along it (Liu, Du, Du, Wang and Wu, Earthquake Eng. Eng.
@@ -22,37 +19,7 @@ NORMAL, TANGENTIAL = 4.0 / 3.0, 2.0 / 3.0
 _GAUSS = 1.0 / np.sqrt(3.0)
 
 
-@joinable
-@dataclass(frozen=True, kw_only=True)
-class AbsorbingNodes:
-    """Nodes of absorbing boundaries; none where a scene has none.
-
-    Attributes:
-        ENERGIES: entries of the energy ledger that their columns add to.
-        node: sorted, shape (count,), int32.
-        damping: matrix C of each node's dashpots [N s/m], symmetric, 0 for axes at rest, shape (count, 3, 3), float64.
-        stiffness: matrix S of each node's springs [N/m], symmetric, 0 for axes at rest, shape (count, 3, 3), float64.
-        velocity: of the body that each belongs to, relative to which they absorb [m/s], shape (count, 3), float64.
-    """
-
-    ENERGIES: ClassVar[tuple[str, ...]] = ("absorbed", "external_work")
-
-    node: Index = field(metadata=of("nodes"))
-    damping: Array = field(metadata=AS_IS)
-    stiffness: Array = field(metadata=AS_IS)
-    velocity: Array = field(metadata=AS_IS)
-
-    @property
-    def sprung(self) -> bool:
-        """Whether there are springs."""
-        return bool(self.stiffness.any())
-
-    def eigenvalues(self, mass: Array) -> Array:
-        """What the springs add at each node to the eigenvalue that bounds the stable step [1/s^2], shape (count,)."""
-        return np.linalg.eigvalsh(self.stiffness)[:, -1] / mass[self.node]
-
-
-def absorbing_nodes(parts: Assembly, V: Array, held: dict[str, NDArray], pairs: dict[str, NDArray]) -> AbsorbingNodes:
+def absorbing_nodes(parts: Bodies, V: Array, held: dict[str, NDArray], pairs: dict[str, NDArray]) -> AbsorbingNodes:
     """Dashpots of the scene's absorbing boundaries; nodes whose motion is given in all directions need none.
 
     Args:
@@ -85,7 +52,7 @@ def absorbing_nodes(parts: Assembly, V: Array, held: dict[str, NDArray], pairs: 
     return AbsorbingNodes(node=node, damping=total[0, node], stiffness=total[1, node], velocity=V[node])
 
 
-def _check_motion(parts: Assembly, item: Absorbing, V: Array) -> None:
+def _check_motion(parts: Bodies, item: Absorbing, V: Array) -> None:
     """Refuse a body that turns: no constant velocity is its own.
 
     Raises:
@@ -98,7 +65,7 @@ def _check_motion(parts: Assembly, item: Absorbing, V: Array) -> None:
         raise bad_value("Absorbing.body", item.body, what)
 
 
-def _face_matrices(parts: Assembly, item: Absorbing, face: Index, element: Index) -> Array:
+def _face_matrices(parts: Bodies, item: Absorbing, face: Index, element: Index) -> Array:
     """Damping [N s/m] and stiffness [N/m] that each face gives its corners, shape (2, face_count, 4, 3, 3).
 
     C_i = integral of N_i rho (c_p n n^T + c_s (I - n n^T)) dA, S_i = integral of N_i G / R (NORMAL n n^T + TANGENTIAL
@@ -127,7 +94,7 @@ def _face_matrices(parts: Assembly, item: Absorbing, face: Index, element: Index
     return found
 
 
-def _centre(parts: Assembly, item: Absorbing) -> Array:
+def _centre(parts: Bodies, item: Absorbing) -> Array:
     """Where the loads act [m], shape (3,); infinitely far away where nothing is said of it."""
     if item.centre is None:
         return np.full(3, np.inf)
@@ -135,7 +102,7 @@ def _centre(parts: Assembly, item: Absorbing) -> Array:
     return parts.X[first] + turn @ (np.asarray(item.centre) - parts.meshes[item.body].points[0])
 
 
-def _bound(parts: Assembly, node: NDArray, held: dict[str, NDArray], pairs: dict[str, NDArray]) -> NDArray[np.bool_]:
+def _bound(parts: Bodies, node: NDArray, held: dict[str, NDArray], pairs: dict[str, NDArray]) -> NDArray[np.bool_]:
     """Which of the nodes have their motion given in all directions: driven axes, or ties with the ground.
 
     Raises:

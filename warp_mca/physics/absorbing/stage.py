@@ -12,14 +12,14 @@ import warp as wp
 from warp_mca.kernels.nodes.absorbing import Dashpots, absorbing_kernel
 from warp_mca.kernels.nodes.gather import LEVEL_BIT
 from warp_mca.kernels.records.absorbing import sum_absorbed
-from warp_mca.model.columns import added_columns
-from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.elements.stage import BLOCK_DIM
-from warp_mca.step.stage import BESIDE, Stage, Step
+from warp_mca.system.actor import Actor, When
+from warp_mca.system.columns import added_columns
+from warp_mca.system.stage import BESIDE, Stage, Step
 
 if TYPE_CHECKING:
-    from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.actor import System
+    from warp_mca.system.state import State
 
 
 @dataclass(eq=False)
@@ -51,7 +51,7 @@ class AbsorbingStage(Actor):
 
     block_dim = BLOCK_DIM
 
-    def __init__(self, solver: Solver) -> None:
+    def __init__(self, solver: System) -> None:
         """Allocate on the current device."""
         model, nodes, layout = solver.model, solver.nodes, solver.layout
         own, self.nodes, self.layout, self.records = model.absorbing, nodes, layout, solver.records

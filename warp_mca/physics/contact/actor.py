@@ -10,19 +10,19 @@ import numpy as np
 
 from warp_mca.kernels.contact import contact
 from warp_mca.kernels.contact.spring_sums import sum_springs
-from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.contact.contact_state import ContactState
 from warp_mca.physics.contact.edge_stage import EdgeStage, NoEdgeStage
 from warp_mca.physics.contact.extremes import NormalForce
 from warp_mca.physics.contact.skin_edges import EdgePass
 from warp_mca.physics.contact.stage import ContactStage
-from warp_mca.step.stage import BESIDE, BEYOND, LISTS, SPRINGS, Search, Stage, Step
+from warp_mca.system.actor import Actor, When
+from warp_mca.system.stage import BESIDE, BEYOND, LISTS, SPRINGS, Search, Stage, Step
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
-    from warp_mca.physics.contact.surfaces import ContactPass
-    from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.actor import System
+    from warp_mca.system.contact import ContactPass
+    from warp_mca.system.model import Model
+    from warp_mca.system.state import State
 
 
 def stage_of(items: Sequence[ContactPass], model: Model, index: int, normal_force: NormalForce) -> ContactStage:
@@ -45,7 +45,7 @@ class Contacts(list[ContactStage], Actor):
 
     block_dim = contact.BLOCK_DIM
 
-    def __init__(self, solver: Solver) -> None:
+    def __init__(self, solver: System) -> None:
         """Allocate on the current device."""
         model, count = solver.model, len(solver.model.passes) // solver.layout.count
         scenes = [model.passes[k * count : (k + 1) * count] for k in range(solver.layout.count)]

@@ -18,39 +18,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warp_mca.base.arrays import Array
-from warp_mca.model.assembly import Assembly
 from warp_mca.physics.contact.stiffness import FLAT, nearest_faces
-from warp_mca.physics.contact.surfaces import Faces
 from warp_mca.scene import Contact, RigidPlane, Surface
+from warp_mca.system.bodies import Bodies
+from warp_mca.system.contact import ChosenPenalty, Faces
 
 SHARE = 0.067  # of the energy that springs may hold, by estimate: some 2 % of the force peak
 SATURATION = 1.3
 LEAST, MOST = 0.1, 30.0  # penalties that are chosen; stiffer springs shorten the step
 NEAR = 4.0  # faces that tell the curvature, in widths of the face that is touched first
 FLATNESS = 1e-4  # angle over which faces turn within that reach, below which they are flat [rad]
-
-
-@dataclass(frozen=True, kw_only=True)
-class ChosenPenalty:
-    """What was chosen for a contact, and why.
-
-    Attributes:
-        penalty: factor of the contact stiffness [-].
-        why: "curved", or why the default was taken: "flat", or "no approach".
-        share: of the energy that springs will hold, by estimate [-]; None where it was not estimated.
-        radius: relative radius of curvature where the bodies are nearest to each other [m].
-        patch: radius of the contact by Hertz at its greatest force [m].
-        mass: that is stopped there, both bodies together [kg].
-        speed: of their approach [m/s].
-    """
-
-    penalty: float
-    why: str
-    share: float | None = None
-    radius: float | None = None
-    patch: float | None = None
-    mass: float | None = None
-    speed: float | None = None
 
 
 @dataclass(frozen=True)
@@ -86,7 +63,7 @@ class _Side:
 
 
 def chosen_penalty(
-    parts: Assembly, contact: Contact, slave: Faces, master: Faces | None, velocity: Array
+    parts: Bodies, contact: Contact, slave: Faces, master: Faces | None, velocity: Array
 ) -> ChosenPenalty:
     """The penalty of a contact that leaves it to the program; `velocity` of the nodes [m/s], shape (node_count, 3)."""
     own, other, normal = _nearest(contact, slave, master)
@@ -115,7 +92,7 @@ def chosen_penalty(
 
 
 def settled(
-    parts: Assembly, contact: Contact, slave: Faces, master: Faces | None, velocity: Array
+    parts: Bodies, contact: Contact, slave: Faces, master: Faces | None, velocity: Array
 ) -> tuple[Contact, ChosenPenalty | None]:
     """The contact with a number for its penalty, if that is left to the program, and what was chosen."""
     if contact.penalty != "auto":
@@ -136,7 +113,7 @@ def _nearest(contact: Contact, slave: Faces, master: Faces | None) -> tuple[_Sid
     return _Side(slave, own), None if master is None else _Side(master, other), normal
 
 
-def _yielding(parts: Assembly, name: str, place: Array, normal: Array) -> float:
+def _yielding(parts: Bodies, name: str, place: Array, normal: Array) -> float:
     """How easily a free body moves along a direction at a place, 1/m + (r x n) . I^-1 (r x n) [1/kg]; 0 if it is held.
 
     Joints are left out. A body that is held along other axes does not turn.
@@ -154,7 +131,7 @@ def _yielding(parts: Assembly, name: str, place: Array, normal: Array) -> float:
     return float(1.0 / mass.sum() + turning @ np.linalg.solve(inertia, turning))
 
 
-def _planes(parts: Assembly, contact: Contact, slave: Faces) -> int:
+def _planes(parts: Bodies, contact: Contact, slave: Faces) -> int:
     """Planes of symmetry that cut the contact: axes along which some nodes of the slave's surface are held."""
     body = contact.slave.body
     sets = [(item.axes, parts.nodes(body, item.nodes)) for item in parts.scene.fixed if item.body == body]

@@ -6,8 +6,8 @@ import numpy as np
 
 from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
-from warp_mca.physics.contact.surfaces import Faces
 from warp_mca.scene import Contact, RigidPlane
+from warp_mca.system.contact import Faces
 
 CLOSED = 1e-6  # share of a surface's area below which its normals cancel
 PARALLEL = 1e-6  # sine of the angle between directions that count as one

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -19,14 +19,15 @@ from warp_mca.kernels.contact import bond
 from warp_mca.physics.contact.friction_laws import node_areas
 from warp_mca.physics.contact.sides import face_geometry, find_sides
 from warp_mca.scene import Contact, Surface
+from warp_mca.system.contact import BondedNodes
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
     from warp_mca.physics.contact.contact_state import ContactState
     from warp_mca.physics.contact.stage import ContactStage
-    from warp_mca.physics.contact.surfaces import ContactPass, Faces
     from warp_mca.scene import Scene
-    from warp_mca.step.state import State
+    from warp_mca.system.contact import ContactPass, Faces
+    from warp_mca.system.state import State
 
 OPPOSED = -0.7  # cosine between the normals of a face and of one of the slave's around a node that it holds, at most
 BEYOND = 0.1  # of a face's width, by which glued nodes may lie beyond its edges, as on the chords of a coarse rim
@@ -47,22 +48,6 @@ class Place(NamedTuple):
     face: Index
     weight: Array
     edge: Array
-
-
-@dataclass(frozen=True, kw_only=True)
-class BondedNodes:
-    """Bonds of a contact pass, of each of its slave nodes.
-
-    Attributes:
-        face: of the pass, to which the node is glued, or -1, shape (slave_count,), int32.
-        weight: shape functions of its corners there [-], shape (slave_count, 4), float64.
-        limit: force in tension and in shear at which the bond fails, infinite where it never does [N], shape
-            (slave_count, 2), float64.
-    """
-
-    face: Index
-    weight: Array
-    limit: Array
 
 
 def places(contact: Contact, meshes: Mapping[str, Mesh], X: Mapping[str, Array]) -> Place:

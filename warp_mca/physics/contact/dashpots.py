@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from warp_mca.base.errors import bad_value
 from warp_mca.kernels.contact.laws import law_functions
-from warp_mca.physics.contact.surfaces import ContactPass
+from warp_mca.system.contact import ContactPass
 
 
 def check_dashpots(items: Sequence[ContactPass]) -> None:

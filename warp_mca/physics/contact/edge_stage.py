@@ -16,14 +16,14 @@ from warp_mca.physics.contact.per_scene import per_scene
 from warp_mca.physics.contact.skin_edges import EdgePass
 from warp_mca.physics.contact.slave_edges import new_springs
 from warp_mca.physics.contact.stage import ContactStage
-from warp_mca.physics.contact.surfaces import LIST_LENGTH
-from warp_mca.step.threads import CONTACT, Split, whole
+from warp_mca.system.contact import LIST_LENGTH
+from warp_mca.system.threads import CONTACT, Split, whole
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
     from warp_mca.physics.contact.extremes import NormalForce
-    from warp_mca.step.state import State
-    from warp_mca.step.workspace import Workspace
+    from warp_mca.system.model import Model
+    from warp_mca.system.state import State
+    from warp_mca.system.workspace import Workspace
 
 ROOM = 4 * LIST_LENGTH  # edges of the slave near one of the master
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from warp_mca.base.arrays import Array, Index
 from warp_mca.physics.contact.stiffness import node_mean
-from warp_mca.physics.contact.surfaces import ContactPass, Faces
+from warp_mca.system.contact import ContactPass, Faces
 
 
 def contact_eigenvalues(item: ContactPass, slave: Faces, master: Faces | None, mass: Array) -> tuple[Index, Array]:

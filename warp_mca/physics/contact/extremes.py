@@ -8,8 +8,8 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.physics.contact.surfaces import ContactPass
-from warp_mca.step.threads import RANGES
+from warp_mca.system.contact import ContactPass
+from warp_mca.system.threads import RANGES
 
 _BITS = 60  # of the whole numbers, below their sign, that springs as deep as their faces are long would fill
 _DASHPOTS = 12  # of these bits that are left to forces of dashpots

@@ -14,7 +14,7 @@ from warp_mca.scene import Contact, ContactAll
 from warp_mca.scene.friction_laws import friction_parameters
 
 if TYPE_CHECKING:
-    from warp_mca.physics.contact.surfaces import ContactPass, Faces
+    from warp_mca.system.contact import ContactPass, Faces
 
 
 def node_areas(slave: Faces) -> Array:

@@ -8,24 +8,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warp_mca.base.arrays import Array, Index
-from warp_mca.physics.contact.pairs import SLOTS, Pairs
 from warp_mca.physics.contact.resting import at_rest
 from warp_mca.physics.contact.sides import is_curved
 from warp_mca.physics.contact.skin_edges import edge_eigenvalues, general_edges
-from warp_mca.physics.contact.stiffness import CURVED, FLAT, node_mean
-from warp_mca.physics.contact.surfaces import LONGEST_LIST, ContactPass, Faces, surface_pass
+from warp_mca.physics.contact.stiffness import CURVED, FLAT, Inertia, node_mean
+from warp_mca.physics.contact.surfaces import LONGEST_LIST, surface_faces, surface_pass
 from warp_mca.scene import ContactAll, Surface
+from warp_mca.system.contact import SLOTS, ContactPass, Faces, Pairs
 
 if TYPE_CHECKING:
-    from warp_mca.model.assembly import Assembly
+    from warp_mca.system.bodies import Bodies
 
 DEEP = 2.0  # times the width of a face, as far behind which nodes of its own body lie in the wall below it
 ASIDE = 1.0  # widths of a face, as far beside it
 
 
-def general_passes(
-    parts: Assembly, contact: ContactAll, index: int, velocity: Array
-) -> tuple[list[ContactPass], Array]:
+def general_passes(parts: Bodies, contact: ContactAll, index: int, velocity: Array) -> tuple[list[ContactPass], Array]:
     """The pass of a general contact, that of its edges if some may cross, and what their springs can add to the
     largest eigenvalue at each node [1/s^2].
 
@@ -34,7 +32,7 @@ def general_passes(
     assert not isinstance(contact.penalty, str)  # a scene refuses it
     pairs = parts.scene.general_pairs()
     names = [body.name for body in parts.scene.bodies if any(body.name in pair for pair in pairs)]
-    skins = [parts.faces(Surface(body=name, nodes="boundary")) for name in names]
+    skins = [surface_faces(parts, Surface(body=name, nodes="boundary")) for name in names]
     number = {name: k for k, name in enumerate(names)}
     factor = np.zeros((len(names), len(names)))
     curved = [is_curved(skin.node, skin.normal) for skin in skins]
@@ -57,7 +55,7 @@ def general_passes(
     found = Pairs(body=body, face=faces, factor=factor, barred_offset=offset, barred=barred)
     item = replace(item, room=room, pairs=found)
     added = _eigenvalues(parts.mass, item, union)
-    edges = general_edges(parts.X, parts.inertia, item, union, contact.penalty)
+    edges = general_edges(parts.X, Inertia.of(parts), item, union, contact.penalty)
     if edges is None:
         return [item], added
     nodes, value = edge_eigenvalues(edges, parts.mass)

@@ -10,16 +10,18 @@ import numpy as np
 
 from warp_mca.base.arrays import Array, Index
 from warp_mca.geometry.exposure import Exposure
-from warp_mca.physics.contact.auto_penalty import ChosenPenalty, settled
+from warp_mca.physics.contact.auto_penalty import settled
 from warp_mca.physics.contact.bonds import Place, bonded
 from warp_mca.physics.contact.eigenvalues import contact_eigenvalues
 from warp_mca.physics.contact.resting import resting
 from warp_mca.physics.contact.skin_edges import edge_eigenvalues, edge_pass, is_two_way, no_edges
-from warp_mca.physics.contact.surfaces import ContactPass, Faces, contact_passes
+from warp_mca.physics.contact.stiffness import Inertia
+from warp_mca.physics.contact.surfaces import contact_passes, faces_of
 from warp_mca.scene import Contact, RigidPlane, Surface
+from warp_mca.system.contact import ChosenPenalty, ContactPass, Faces
 
 if TYPE_CHECKING:
-    from warp_mca.model.assembly import Assembly
+    from warp_mca.system.bodies import Bodies
 
 
 class Given(NamedTuple):
@@ -31,7 +33,7 @@ class Given(NamedTuple):
 
 
 def as_settled(
-    parts: Assembly, contact: Contact, slave: Faces, master: Faces | None, velocity: Array
+    parts: Bodies, contact: Contact, slave: Faces, master: Faces | None, velocity: Array
 ) -> tuple[Contact, ChosenPenalty | None]:
     """A contact with all that is left to the program, and the penalty that was chosen."""
     contact = replace(contact, two_way=is_two_way(contact, slave, master))
@@ -40,7 +42,7 @@ def as_settled(
 
 
 def passes_of(
-    parts: Assembly, contact: Contact, index: int, slave: Faces, master: Faces | None, place: Place | None = None
+    parts: Bodies, contact: Contact, index: int, slave: Faces, master: Faces | None, place: Place | None = None
 ) -> list[Given]:
     """The passes of a contact as `as_settled` gives it: of nodes, one or two, then of edges where some may cross.
 
@@ -58,14 +60,14 @@ def passes_of(
         given.append(Given(replace(item, decay=decay), nodes, value))
     if master is None:
         return given
-    if edges := edge_pass(parts.X, parts.inertia, found[0], slave, master, contact):
+    if edges := edge_pass(parts.X, Inertia.of(parts), found[0], slave, master, contact):
         given.append(Given(edges, *edge_eigenvalues(edges, parts.mass)))
     elif set(contact.sides) & set(parts.scene.failing):
         given.append(Given(no_edges(found[0]), np.zeros(0, np.int32), np.zeros(0)))
     return given
 
 
-def growth(parts: Assembly, contact: Contact, index: int, given: Sequence[Given]) -> Array:
+def growth(parts: Bodies, contact: Contact, index: int, given: Sequence[Given]) -> Array:
     """By how much what a contact adds at each node may grow as elements fail [1/s^2], shape (node_count,), float64.
 
     As the passes with all inner faces at once, over those that are `given`.
@@ -77,7 +79,7 @@ def growth(parts: Assembly, contact: Contact, index: int, given: Sequence[Given]
     def faces(surface: Surface) -> Faces:
         mesh = parts.meshes[surface.body]
         own = Exposure(mesh).all_faces(surface.nodes) if surface.body in failing else mesh.surface(surface.nodes)
-        return parts.faces_of(surface.body, *own)
+        return faces_of(parts, surface.body, *own)
 
     master = None if isinstance(contact.master, RigidPlane) else faces(contact.master)
     sums = np.zeros((2, len(parts.X)))

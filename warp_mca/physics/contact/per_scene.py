@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from warp_mca.base.joining import offsets
 from warp_mca.kernels.contact import pairs
-from warp_mca.physics.contact.pairs import Pairs
+from warp_mca.system.contact import Pairs
 
 
 def per_scene(first: NDArray[np.int32]) -> Any:

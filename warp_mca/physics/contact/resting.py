@@ -20,14 +20,14 @@ from warp_mca.scene import Contact, ContactAll, RigidPlane, Scene
 from warp_mca.scene.contact_laws import ContactLaw, DampedPenalty, Penalty
 
 if TYPE_CHECKING:
-    from warp_mca.model.assembly import Assembly
-    from warp_mca.model.model import Model
-    from warp_mca.physics.contact.surfaces import Faces
+    from warp_mca.system.bodies import Bodies
+    from warp_mca.system.contact import Faces
+    from warp_mca.system.model import Model
 
 CRITICAL = 0.5  # share of the critical damping of a slave node on its spring
 
 
-def resting(parts: Assembly, contact: Contact, slave: Faces, master: Faces | None, velocity: Array) -> Contact:
+def resting(parts: Bodies, contact: Contact, slave: Faces, master: Faces | None, velocity: Array) -> Contact:
     """The contact with its law, if that is left to the program; `velocity` of nodes [m/s], shape (node_count, 3)."""
     if contact.law is not None or not any(parts.scene.gravity):
         return contact
@@ -50,7 +50,7 @@ def resting(parts: Assembly, contact: Contact, slave: Faces, master: Faces | Non
 
 
 def at_rest(
-    parts: Assembly,
+    parts: Bodies,
     contact: ContactAll,
     pairs: Sequence[tuple[str, str]],
     nodes: Index,
@@ -82,7 +82,7 @@ def undamped(model: Model, scene: Scene) -> Model:
 
 
 def usual_law(
-    parts: Assembly, bodies: Sequence[str], approach: float, apart: float, nodes: Index, stiffness: Array
+    parts: Bodies, bodies: Sequence[str], approach: float, apart: float, nodes: Index, stiffness: Array
 ) -> ContactLaw:
     """The law of a contact that leaves it to the program: with a dashpot where bodies rest on each other.
 
@@ -106,7 +106,7 @@ def usual_law(
     return DampedPenalty(time=2.0 * CRITICAL * float(np.sqrt(mass[free] / stiffness[free]).min()), speed=speed)
 
 
-def _bounce(parts: Assembly, body: str, stiffness: float) -> float:
+def _bounce(parts: Bodies, body: str, stiffness: float) -> float:
     """Time in which a body of its mass bounces on springs, and a wave passes through its height [s]."""
     nodes, start = parts.all_nodes(body), parts.element_start[body]
     cells = slice(start, start + parts.meshes[body].cell_count)

@@ -13,8 +13,8 @@ from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.kernels.contact.edge_pairs import SLOTS
 from warp_mca.physics.contact.sides import SHARP, neighbours
 from warp_mca.physics.contact.stiffness import Inertia, edge_stiffness, nearest_faces
-from warp_mca.physics.contact.surfaces import ContactPass, Faces
 from warp_mca.scene import Contact
+from warp_mca.system.contact import ContactPass, Faces
 
 BLUNT = math.radians(3.0)  # angle between the faces beside an edge from which on it may press another
 TENTH = 0.1  # of the area of a surface that has faces as small as those by which it is judged

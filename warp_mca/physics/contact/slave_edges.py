@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from warp_mca.kernels.contact import contact, edge_shares, edges, spring
 from warp_mca.kernels.contact.laws import law_functions
 from warp_mca.physics.contact.bonds import glue
-from warp_mca.step.threads import CONTACT, Split
+from warp_mca.system.threads import CONTACT, Split
 
 if TYPE_CHECKING:
     from warp_mca.physics.contact.contact_state import ContactState
     from warp_mca.physics.contact.stage import ContactStage
-    from warp_mca.step.state import State
-    from warp_mca.step.workspace import Workspace
+    from warp_mca.system.state import State
+    from warp_mca.system.workspace import Workspace
 
 
 def new_springs(count: int, sided: int, stage: ContactStage) -> Any:

@@ -18,17 +18,16 @@ from warp_mca.physics.contact.bonds import bond_lists, list_bonds
 from warp_mca.physics.contact.contact_state import ContactState
 from warp_mca.physics.contact.dashpots import check_dashpots
 from warp_mca.physics.contact.friction_laws import friction_rows
-from warp_mca.physics.contact.pairs import SLOTS
 from warp_mca.physics.contact.per_scene import device_pairs, numbers, per_scene, vectors
 from warp_mca.physics.contact.slave_edges import SlaveEdges, faces_of_slaves, new_springs
-from warp_mca.physics.contact.surfaces import LIST_LENGTH, ContactPass
-from warp_mca.step.threads import CONTACT, Split, whole
+from warp_mca.system.contact import LIST_LENGTH, SLOTS, ContactPass
+from warp_mca.system.threads import CONTACT, Split, whole
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
     from warp_mca.physics.contact.extremes import NormalForce
-    from warp_mca.step.state import State
-    from warp_mca.step.workspace import Workspace
+    from warp_mca.system.model import Model
+    from warp_mca.system.state import State
+    from warp_mca.system.workspace import Workspace
 
 
 def has_sides(model: Model) -> bool:

@@ -12,7 +12,8 @@ from warp_mca.physics.contact.sides import MAX_SIDES, find_sides, is_curved
 from warp_mca.scene import Contact, RigidPlane
 
 if TYPE_CHECKING:
-    from warp_mca.physics.contact.surfaces import Faces
+    from warp_mca.system.bodies import Bodies
+    from warp_mca.system.contact import Faces
 
 # Default spring stiffness over E* A / d, with E* = E / (1 - nu^2) and the height d of a cell. Flat ends whose springs
 # are stiffer ring, because they close more quickly than waves leave the first cells. Few nodes carry a curved contact,
@@ -27,6 +28,11 @@ class Inertia(NamedTuple):
 
     node: Array
     element: Array
+
+    @staticmethod
+    def of(parts: Bodies) -> Inertia:
+        """Of the bodies of a scene."""
+        return Inertia(parts.mass, parts.rho * parts.volume)
 
 
 def nearest_faces(contact: Contact, slave: Faces, master: Faces | None) -> tuple[int, int]:

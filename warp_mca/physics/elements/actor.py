@@ -6,14 +6,14 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.elements import ELEMENTS
 from warp_mca.physics.elements.stage import BLOCK_DIM, ElementStage
 from warp_mca.physics.elements.state import ElementState
-from warp_mca.step.stage import SUMS, Stage, Step
+from warp_mca.system.actor import Actor, When
+from warp_mca.system.stage import SUMS, Stage, Step
 
 if TYPE_CHECKING:
-    from warp_mca.step.solver import Solver
+    from warp_mca.system.actor import System
 
 
 class Elements(list[ElementStage], Actor):
@@ -21,7 +21,7 @@ class Elements(list[ElementStage], Actor):
 
     block_dim = BLOCK_DIM
 
-    def __init__(self, solver: Solver) -> None:
+    def __init__(self, solver: System) -> None:
         """Allocate on the current device."""
         model = solver.model
         super().__init__(ELEMENTS[block.element].stage(block, model.X, solver.precision) for block in model.blocks)

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from warp_mca.model.block import Block
     from warp_mca.physics.elements.stage import ElementStage
+    from warp_mca.system.block import Block
 
 Array = NDArray[np.float64]
 

@@ -11,14 +11,14 @@ import warp as wp
 from warp_mca.base.errors import bad_value
 from warp_mca.kernels.elements.failure import follow_nodes, lose_kernel, silence_kernel
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.model.precision import limited
-from warp_mca.step.threads import ELEMENTS, Split, whole
+from warp_mca.system.precision import limited
+from warp_mca.system.threads import ELEMENTS, Split, whole
 
 if TYPE_CHECKING:
-    from warp_mca.model.block import Block
     from warp_mca.physics.elements.stage import ElementStage
-    from warp_mca.step.state import State
-    from warp_mca.step.workspace import Workspace
+    from warp_mca.system.block import Block
+    from warp_mca.system.state import State
+    from warp_mca.system.workspace import Workspace
 
 
 @dataclass(eq=False)
@@ -54,7 +54,7 @@ class Failing:
         X: reference positions of the corners of each element [m], corner by corner, shape (corner_count
             element_count,), vec3d.
         conn: places of these in X, shape (corner_count, element_count), int32.
-        parameter: of the criterion, as `model.failing.Failing` has it.
+        parameter: of the criterion, as `system.failing.Failing` has it.
     """
 
     def __init__(self, stage: ElementStage, precision: str, kernels: Any) -> None:

@@ -8,8 +8,8 @@ from warp_mca.physics.elements.element import Array
 from warp_mca.physics.elements.hexahedron import eigenvalue_bounds, largest_eigenvalues, lumped_masses, mean_gradients
 
 if TYPE_CHECKING:
-    from warp_mca.model.block import Block
     from warp_mca.physics.elements.stage import ElementStage
+    from warp_mca.system.block import Block
 
 
 class Hex8:

@@ -17,8 +17,8 @@ from warp_mca.physics.elements.hexahedron import (
 )
 
 if TYPE_CHECKING:
-    from warp_mca.model.block import Block
     from warp_mca.physics.elements.stage import ElementStage
+    from warp_mca.system.block import Block
 
 _VOIGT = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 

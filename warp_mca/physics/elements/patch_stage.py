@@ -14,12 +14,12 @@ from warp_mca.kernels.materials.laws import law_functions
 from warp_mca.physics.elements.patches import Array, grid_points, make_patches
 from warp_mca.physics.elements.stage import BLOCK_DIM, ElementStage, levels_of
 from warp_mca.physics.elements.state import ElementState
-from warp_mca.step.threads import Split, whole
+from warp_mca.system.threads import Split, whole
 
 if TYPE_CHECKING:
-    from warp_mca.model.block import Block
-    from warp_mca.step.state import State
-    from warp_mca.step.workspace import Workspace
+    from warp_mca.system.block import Block
+    from warp_mca.system.state import State
+    from warp_mca.system.workspace import Workspace
 
 
 def patch_size(elements: int, multiprocessors: int) -> int:

@@ -20,12 +20,12 @@ from warp_mca.kernels.loads import thermal
 from warp_mca.kernels.materials.laws import ROWS, law_functions, row_count
 from warp_mca.physics.elements.failing import failing_of
 from warp_mca.physics.elements.state import ElementState
-from warp_mca.step.threads import ELEMENTS, Split, whole
+from warp_mca.system.threads import ELEMENTS, Split, whole
 
 if TYPE_CHECKING:
-    from warp_mca.model.block import Block
-    from warp_mca.step.state import State
-    from warp_mca.step.workspace import Workspace
+    from warp_mca.system.block import Block
+    from warp_mca.system.state import State
+    from warp_mca.system.workspace import Workspace
 
 Index = NDArray[np.int32]
 
@@ -119,6 +119,7 @@ class ElementStage:
             yielded=wp.zeros(self.count if self.block.plastic else 0, dtype=wp.int32),
             history=wp.zeros((row_count(self.kept), self.count if self.kept else 0), dtype=self.real),
             extreme=wp.array(extreme, dtype=self.real),
+            peak=wp.zeros((5 if self.law.plastic_row >= 0 else 3, self.count), dtype=wp.float32),
             failing=self.failing.new_state() if self.failing else None,
         )
 
@@ -218,7 +219,8 @@ class ElementStage:
             inputs = [X, conn[:, part], self.material[part], work.law, *self._history(own, part)]
             inputs += [own.extreme[:, part], seen, self.block.first + part.start, *self.nodal(part)]
             count, first = part.stop - part.start, self.block.first + part.start
-            wp.launch(self.energy_kernel, count, inputs=inputs, outputs=[work.energy], block_dim=BLOCK_DIM)
+            outputs = [work.energy, own.peak[:, part]]
+            wp.launch(self.energy_kernel, count, inputs=inputs, outputs=outputs, block_dim=BLOCK_DIM)
             if self.block.viscous:
                 wp.copy(work.energy[5, first : first + count], own.extreme[TAKEN, part])
             if self.failing:

@@ -21,10 +21,13 @@ class ElementState:
         extreme: greatest square of the deviatoric strain and greatest loss of volume 1 - J of any step [-], from 0 on;
             where internal vectors lag behind, the energy that this took [J]; of viscous elements, what
             `kernels.elements.viscosity` lists; shape (row_count, element_count), float32 or float64.
+        peak: greatest von Mises stress [Pa] and plastic strain [-] at any record since the start of the impact, and the
+            numbers of these, `kernels.records.extremes`, shape (3 or 5, element_count), float32.
         failing: of elements that may fail, `FailureState`; None of others.
     """
 
     yielded: wp.array
     history: wp.array
     extreme: wp.array
+    peak: wp.array
     failing: FailureState | None = None

@@ -11,8 +11,8 @@ from warp_mca.geometry.tetra10 import POINTS, SHARES, derivatives, determinants,
 from warp_mca.physics.elements.element import Array, largest
 
 if TYPE_CHECKING:
-    from warp_mca.model.block import Block
     from warp_mca.physics.elements.stage import ElementStage
+    from warp_mca.system.block import Block
 
 
 def _spread() -> float:

@@ -12,12 +12,12 @@ from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.simd import vectorised
 from warp_mca.physics.elements.element import Array
 from warp_mca.physics.elements.stage import BLOCK_DIM, ElementStage
-from warp_mca.step.threads import ELEMENTS, NODES, Split, whole
+from warp_mca.system.threads import ELEMENTS, NODES, Split, whole
 
 if TYPE_CHECKING:
-    from warp_mca.model.block import Block
-    from warp_mca.step.state import State
-    from warp_mca.step.workspace import Workspace
+    from warp_mca.system.block import Block
+    from warp_mca.system.state import State
+    from warp_mca.system.workspace import Workspace
 
 
 class Tet4Stage(ElementStage):

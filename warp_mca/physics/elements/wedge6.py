@@ -10,8 +10,8 @@ from warp_mca.base.chunks import chunks
 from warp_mca.physics.elements.element import Array, largest
 
 if TYPE_CHECKING:
-    from warp_mca.model.block import Block
     from warp_mca.physics.elements.stage import ElementStage
+    from warp_mca.system.block import Block
 
 # Rows as in `kernels.elements.wedge_shape`: patterns r, s, zeta, zeta r and zeta s of the corners, shape (5, 6).
 _PATTERNS = np.array(

@@ -8,34 +8,22 @@ of waves in bars, L the body's length, eps = 2^-24. docs/decisions.md has the me
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from warp_mca.base.arrays import Array, Index
 from warp_mca.scene import Body, Scene
+from warp_mca.system.floating import FloatingFrames
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
+    from warp_mca.system.model import Model
 
 
 GAIN = 3.0  # measured with `hex8`
 ALLOWED = 1e-4  # growth of the kinetic energy that needs no frames [-]
 EPSILON = 2.0**-24  # by which float32 rounds
-
-
-@dataclass(frozen=True, kw_only=True)
-class FloatingFrames:
-    """A frame for each body, those of each scene in turn.
-
-    Attributes:
-        frame: of each node, shape (node_count,), int32.
-        marker: nodes that each frame follows, shape (frame_count, 4), int32.
-    """
-
-    frame: Index
-    marker: Index
 
 
 def with_floating_frames(model: Model, scenes: Sequence[Scene], span: float, precision: str) -> Model:

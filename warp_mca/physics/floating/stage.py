@@ -10,13 +10,13 @@ import numpy as np
 import warp as wp
 
 from warp_mca.kernels.nodes import floating
-from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.elements.stage import BLOCK_DIM
-from warp_mca.step.stage import Stage, Step
-from warp_mca.step.threads import NODES
+from warp_mca.system.actor import Actor, When
+from warp_mca.system.stage import Stage, Step
+from warp_mca.system.threads import NODES
 
 if TYPE_CHECKING:
-    from warp_mca.step.solver import Solver
+    from warp_mca.system.actor import System
 
 
 @dataclass(eq=False)
@@ -39,7 +39,7 @@ class FloatingStage(Actor):
 
     block_dim = BLOCK_DIM
 
-    def __init__(self, solver: Solver) -> None:
+    def __init__(self, solver: System) -> None:
         """Allocate on the current device."""
         model, work = solver.model, solver.work
         marker = model.floating.marker if model.floating else np.zeros((0, 4), np.int32)

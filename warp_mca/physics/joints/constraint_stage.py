@@ -12,12 +12,12 @@ import warp as wp
 from warp_mca.kernels.nodes import slide
 from warp_mca.kernels.nodes.constraint import Bonds
 from warp_mca.kernels.nodes.gather import BOUND, TOUCHABLE
-from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.rigid.bodies import moves_with_rigid, rigid_nodes
-from warp_mca.step.stage import BESIDE, Stage
+from warp_mca.system.actor import Actor, When
+from warp_mca.system.stage import BESIDE, Stage
 
 if TYPE_CHECKING:
-    from warp_mca.step.solver import Solver
+    from warp_mca.system.actor import System
 
 
 @dataclass(eq=False)
@@ -54,7 +54,7 @@ class ConstraintStage(Actor):
         driven_first: first driven node of each scene, and the number of all, shape (scene_count + 1,), int32.
     """
 
-    def __init__(self, solver: Solver) -> None:
+    def __init__(self, solver: System) -> None:
         """Allocate on the current device."""
         self.solver, model = solver, solver.model
         nodes, place = np.unique(model.prescribed_node, return_inverse=True)

@@ -3,33 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base import validate
+from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import RequestError, bad_value
-from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.base.rotation import rotation_matrix
-from warp_mca.model.assembly import GROUND, Array, Assembly, Index
-from warp_mca.physics.joints.couplings import Coupling, coupling
-from warp_mca.physics.ties.nodes import TiedNodes
+from warp_mca.physics.joints.couplings import coupling
 from warp_mca.scene.joints import Joint
 from warp_mca.scene.ties import Clusters, Rails, Side, Ties
+from warp_mca.system.bodies import GROUND, Bodies
+from warp_mca.system.joints import Coupling, JointPairs
+from warp_mca.system.ties import TiedNodes
 
 
-@joinable
-@dataclass(frozen=True, kw_only=True)
-class JointPairs:
-    """A joint's pairs: [start, end) of `Model.joint_first` and `joint_second`."""
-
-    name: str = field(metadata=AS_IS)
-    start: int = field(metadata=of("pairs"))
-    end: int = field(metadata=of("pairs"))
-
-
-def constraints(parts: Assembly, V: Array) -> dict[str, NDArray]:
+def constraints(parts: Bodies, V: Array) -> dict[str, NDArray]:
     """Axes at rest as bits; driven axes, fixed ones that move included, as tables, because they do work.
 
     Raises:
@@ -82,7 +73,7 @@ def constraints(parts: Assembly, V: Array) -> dict[str, NDArray]:
     }
 
 
-def _side(parts: Assembly, body: str) -> Side:
+def _side(parts: Bodies, body: str) -> Side:
     mesh, start = parts.meshes[body], parts.node_start[body]
     return Side(body, mesh, parts.X[start : start + len(mesh.points)], rotation_matrix(parts.scene.body(body).rotation))
 
@@ -98,7 +89,7 @@ class _Tied:
     coupling: Coupling | None = None
 
 
-def _tied_pairs(parts: Assembly, joint: Joint, start: int) -> _Tied:
+def _tied_pairs(parts: Bodies, joint: Joint, start: int) -> _Tied:
     """What a joint ties, whose pairs begin at `start`."""
     if joint.whole() is not None:
         nodes = [parts.nodes(*own) for own in joint.sets().values()]
@@ -147,7 +138,7 @@ def _ties_of(joint: Joint, side: Side, other: Side | None) -> Ties | Rails | Clu
     return ties
 
 
-def _on_rails(parts: Assembly, joint: Joint, ties: Rails) -> _Tied:
+def _on_rails(parts: Bodies, joint: Joint, ties: Rails) -> _Tied:
     """Sliders and nodes of each rail as pairs with the ground that are tied in no direction."""
     assert joint.other is not None
     nodes, slides, count = [], [], 0
@@ -159,7 +150,7 @@ def _on_rails(parts: Assembly, joint: Joint, ties: Rails) -> _Tied:
     return _Tied(np.concatenate(nodes), ground, np.zeros((count, 3, 3)), np.array(slides, dtype=np.int32))
 
 
-def _coupled(parts: Assembly, joint: Joint, clusters: Clusters, start: int) -> _Tied:
+def _coupled(parts: Bodies, joint: Joint, clusters: Clusters, start: int) -> _Tied:
     """Nodes of both clusters as pairs with the ground that are tied in no direction."""
     bodies = [(joint.body, clusters.first), (joint.other, clusters.second)]
     sides: list[Side | None] = [None, None]
@@ -177,7 +168,7 @@ def _coupled(parts: Assembly, joint: Joint, clusters: Clusters, start: int) -> _
     return _Tied(a, ground, np.zeros((len(a), 3, 3)), np.zeros((0, 3), np.int32), found)
 
 
-def join_bodies(parts: Assembly) -> tuple[dict[str, NDArray], tuple[JointPairs, ...], tuple[Coupling, ...]]:
+def join_bodies(parts: Bodies) -> tuple[dict[str, NDArray], tuple[JointPairs, ...], tuple[Coupling, ...]]:
     """Pairs of tied nodes as in `Model`, the joints that own them, and those of joints between clusters.
 
     Raises:
@@ -200,7 +191,7 @@ def join_bodies(parts: Assembly) -> tuple[dict[str, NDArray], tuple[JointPairs, 
     return pairs, tuple(joints), tuple(item.coupling for item in found if item.coupling is not None)
 
 
-def _check_shared(parts: Assembly, joints: Sequence[JointPairs], pairs: dict[str, NDArray]) -> None:
+def _check_shared(parts: Bodies, joints: Sequence[JointPairs], pairs: dict[str, NDArray]) -> None:
     """Refuse nodes that are in two pairs: of two corrections at once neither would hold.
 
     Raises:
@@ -216,7 +207,7 @@ def _check_shared(parts: Assembly, joints: Sequence[JointPairs], pairs: dict[str
     raise RequestError(f"Scene.joints: a node is tied twice, that of {parts.where(node)}, by {by}; {remedy}")
 
 
-def _joints_of(parts: Assembly, joints: Sequence[JointPairs], pairs: dict[str, NDArray], node: int) -> Iterator[str]:
+def _joints_of(parts: Bodies, joints: Sequence[JointPairs], pairs: dict[str, NDArray], node: int) -> Iterator[str]:
     """Kind and name of the joints that have a node."""
     for joint, item in zip(parts.scene.joints, joints, strict=True):
         if any(node in pairs[key][item.start : item.end] for key in ("joint_first", "joint_second")):
@@ -240,7 +231,7 @@ def free_nodes(held: dict[str, NDArray], pairs: dict[str, NDArray], ties: TiedNo
 
 
 def check_bindings(
-    parts: Assembly, joints: Sequence[JointPairs], held: dict[str, NDArray], pairs: dict[str, NDArray]
+    parts: Bodies, joints: Sequence[JointPairs], held: dict[str, NDArray], pairs: dict[str, NDArray]
 ) -> None:
     """Refuse nodes of joints that are fixed or driven too: each stage would undo what the other set.
 

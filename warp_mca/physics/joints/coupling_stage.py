@@ -13,11 +13,11 @@ from warp_mca.kernels.nodes import couple
 from warp_mca.kernels.nodes.cluster import Clusters, Sums
 from warp_mca.kernels.nodes.coupling import Inverse
 from warp_mca.kernels.nodes.hinge import Side
-from warp_mca.physics.actor import Actor, When
-from warp_mca.step.stage import ASIDE, BESIDE, Stage, Step
+from warp_mca.system.actor import Actor, When
+from warp_mca.system.stage import ASIDE, BESIDE, Stage, Step
 
 if TYPE_CHECKING:
-    from warp_mca.step.solver import Solver
+    from warp_mca.system.actor import System
 
 # Threads of a block on a GPU, and nodes of its part of a cluster; a CPU takes clusters whole. Small blocks fit in what
 # patches of elements leave free, see `PatchStage.make_room`.
@@ -48,7 +48,7 @@ class CouplingStage(Actor):
 
     block_dim = BLOCK
 
-    def __init__(self, solver: Solver) -> None:
+    def __init__(self, solver: System) -> None:
         """Allocate on the current device."""
         model = solver.model
         self.items, self.count = model.couplings, len(model.couplings)

@@ -4,45 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
 from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
-from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.base.rotation import mean_pose
 from warp_mca.scene.bodies import Vec3
 from warp_mca.scene.joints import Joint
 from warp_mca.scene.ties import Clusters, Side
+from warp_mca.system.joints import Coupling
 
 APART = 1e-3  # of a cluster's extent: distance of the points of both clusters, at most
 FLAT = 1e-3  # of a cluster's radius of inertia: distance from a line below which nodes are on it
 ALIGNED = math.cos(math.radians(1.0))  # between the axes of both bodies, at least
-
-
-@joinable
-@dataclass(frozen=True, kw_only=True)
-class Coupling:
-    """A hinge between two clusters, or a cluster and the ground.
-
-    Attributes:
-        start, middle, end: its nodes are those of the pairs [start, middle) of `Model.joint_first` for the first body
-            and of [middle, end) for the second; the latter are none for the ground.
-        weight: s of each of its nodes [-], shape (end - start,), float64.
-        place: of the hinge at the start [m], shape (3,), float64.
-        axis: of the hinge at the start, a unit vector [-], shape (3,), float64.
-        arm: from the mean position of each cluster to `place` [m], shape (2, 3), float64; 0 for the ground.
-    """
-
-    start: int = field(metadata=of("pairs"))
-    middle: int = field(metadata=of("pairs"))
-    end: int = field(metadata=of("pairs"))
-    weight: Array = field(metadata=AS_IS)
-    place: Array = field(metadata=AS_IS)
-    axis: Array = field(metadata=AS_IS)
-    arm: Array = field(metadata=AS_IS)
 
 
 class _Pose(NamedTuple):

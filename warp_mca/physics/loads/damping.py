@@ -13,11 +13,11 @@ from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
 from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.kernels.nodes.damping import ALL_AXES
-from warp_mca.model.assembly import Assembly
 from warp_mca.physics.loads.damping_stage import DampingStage as Stage
-from warp_mca.physics.loads.nodal import LoadedNodes
 from warp_mca.scene.damping import Damping
 from warp_mca.scene.drives import Fixed
+from warp_mca.system.bodies import Bodies
+from warp_mca.system.loads import LoadedNodes
 
 if TYPE_CHECKING:
     from warp_mca.scene import Scene
@@ -55,7 +55,7 @@ class DampedNodes(LoadedNodes):
         return np.full(len(self.node), self.mass_rate)
 
 
-def build(load: Damping, assembly: Assembly) -> DampedNodes:
+def build(load: Damping, assembly: Bodies) -> DampedNodes:
     """What damps a body.
 
     Raises:
@@ -100,7 +100,7 @@ def build(load: Damping, assembly: Assembly) -> DampedNodes:
 Held = Sequence[tuple[object, Index]]  # drives of nodes, each with what tells it from others
 
 
-def _held(scene: Scene, assembly: Assembly, body: str) -> tuple[Held, Held, Held]:
+def _held(scene: Scene, assembly: Bodies, body: str) -> tuple[Held, Held, Held]:
     """Nodes of a body that are held or driven along x, y and z."""
     found: tuple[list, list, list] = ([], [], [])
     for item in (*scene.fixed, *scene.prescribed):
@@ -111,7 +111,7 @@ def _held(scene: Scene, assembly: Assembly, body: str) -> tuple[Held, Held, Held
     return found
 
 
-def _allowed(held: tuple[Held, Held, Held], assembly: Assembly, body: str) -> tuple[Index, int, bool]:
+def _allowed(held: tuple[Held, Held, Held], assembly: Bodies, body: str) -> tuple[Index, int, bool]:
     """`anchor` and `turns` of a body, and whether held nodes allow a turn that these do not say.
 
     A body moves along an axis along which nothing is held, and turns about an axis where the other two are free.

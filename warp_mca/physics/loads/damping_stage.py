@@ -14,12 +14,12 @@ from warp_mca.base.joining import offsets
 from warp_mca.kernels.nodes import damping
 from warp_mca.kernels.records.ledger import RUN, SUM_WIDTH
 from warp_mca.physics.loads.nodal_stage import NodalLoad
-from warp_mca.step.stage import MAIN, Step
-from warp_mca.step.threads import NODES
+from warp_mca.system.stage import MAIN, Step
+from warp_mca.system.threads import NODES
 
 if TYPE_CHECKING:
-    from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.actor import System
+    from warp_mca.system.state import State
 
 
 @dataclass(eq=False)
@@ -46,7 +46,7 @@ class DampingStage(NodalLoad):
 
     place, stream = "damp", MAIN
 
-    def __init__(self, solver: Solver, name: str) -> None:
+    def __init__(self, solver: System, name: str) -> None:
         """Allocate on the current device."""
         super().__init__(solver, name)
         items, dt, own = self.items, solver.common_dt, damping.DampedBodies()

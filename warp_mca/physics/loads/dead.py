@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 
 from warp_mca.base.joining import AS_IS, joinable
 from warp_mca.kernels.loads.nodes import push_nodes
-from warp_mca.model.assembly import Assembly
 from warp_mca.physics.loads.faces import corner_areas, lone_corners
 from warp_mca.physics.loads.pushed import PushedNodes, TimedNodes
 from warp_mca.scene.loads import BodyForce, Force
 from warp_mca.scene.probes import Point
-from warp_mca.step.stage import Step
+from warp_mca.system.bodies import Bodies
+from warp_mca.system.stage import Step
 
 if TYPE_CHECKING:
-    from warp_mca.step.solver import Solver
+    from warp_mca.system.actor import System
 
 Index = NDArray[np.int32]
 Array = NDArray[np.float64]
@@ -40,7 +40,7 @@ class DeadLoad(TimedNodes):
     vector: Array = field(metadata=AS_IS)
 
 
-def build(load: Force | BodyForce, assembly: Assembly) -> DeadLoad:
+def build(load: Force | BodyForce, assembly: Bodies) -> DeadLoad:
     """Arrays of a load.
 
     Raises:
@@ -61,7 +61,7 @@ def build(load: Force | BodyForce, assembly: Assembly) -> DeadLoad:
     )
 
 
-def _shares(load: Force, assembly: Assembly) -> tuple[Index, Array]:
+def _shares(load: Force, assembly: Bodies) -> tuple[Index, Array]:
     """Nodes of a force, and the share of each, which sum up to 1."""
     if load.at is not None:
         return np.array([assembly.nearest(Point(body=load.body, at=load.at))]), np.ones(1)
@@ -80,7 +80,7 @@ def _shares(load: Force, assembly: Assembly) -> tuple[Index, Array]:
 class Stage(PushedNodes):
     """Device side of forces, or of forces on bodies."""
 
-    def __init__(self, solver: Solver, name: str) -> None:
+    def __init__(self, solver: System, name: str) -> None:
         """Allocate on the current device."""
         super().__init__(solver, name)
         load = np.repeat(np.arange(len(self.items)), [len(item.node) for item in self.items])

@@ -14,13 +14,13 @@ from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.geometry.cell_types import CELL_TYPES
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.kernels.loads.nodes import DEAD, FOLLOWS, PRESSURE, LoadedFaces, push_faces
-from warp_mca.model.assembly import Assembly
 from warp_mca.physics.loads.pushed import PushedNodes, TimedNodes
 from warp_mca.scene.loads import Pressure, Traction
-from warp_mca.step.stage import Step
+from warp_mca.system.bodies import Bodies
+from warp_mca.system.stage import Step
 
 if TYPE_CHECKING:
-    from warp_mca.step.solver import Solver
+    from warp_mca.system.actor import System
 
 Index = NDArray[np.int32]
 Array = NDArray[np.float64]
@@ -71,7 +71,7 @@ def corner_areas(x: Array, alone: Index) -> Array:
     return found
 
 
-def build(load: Pressure | Traction, assembly: Assembly) -> FaceLoad:
+def build(load: Pressure | Traction, assembly: Bodies) -> FaceLoad:
     """Arrays of a load.
 
     Raises:
@@ -99,7 +99,7 @@ def build(load: Pressure | Traction, assembly: Assembly) -> FaceLoad:
 class Stage(PushedNodes):
     """Device side of pressures, or of tractions."""
 
-    def __init__(self, solver: Solver, name: str) -> None:
+    def __init__(self, solver: System, name: str) -> None:
         """Allocate on the current device."""
         super().__init__(solver, name)
         found = self.faces = LoadedFaces()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,10 +10,9 @@ from numpy.typing import NDArray
 
 from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
-from warp_mca.base.joining import AS_IS, SCENE, joinable, of
-from warp_mca.model.assembly import Assembly
-from warp_mca.physics.joints.constraints import JointPairs
-from warp_mca.physics.joints.couplings import Coupling
+from warp_mca.system.bodies import Bodies
+from warp_mca.system.joints import Coupling, JointPairs
+from warp_mca.system.loads import HingeLoad, MovableBase
 
 if TYPE_CHECKING:
     from warp_mca.rigid.chain import Chain, Vec2
@@ -25,57 +23,6 @@ ON_AXIS = 1e-6  # of a body's extent: distance from a hinge's axis up to which n
 MARGIN = 1.0 + 1e-9  # so that rounding leaves no node out
 
 
-@joinable
-@dataclass(frozen=True, kw_only=True)
-class HingeLoad:
-    """Torque and friction in a hinge about z; the laws are those of `rigid.loads.Loads`.
-
-    Attributes:
-        inner, outer: free nodes near the hinge on which the torque acts, of the body before it (empty for the ground)
-            and of the link that it carries, shape (count,), int32.
-        friction: Coulomb torque tau_C [N m].
-        damping: viscous coefficient c [N m s/rad].
-        friction_rate: w_0 [rad/s].
-        times: of the drive's torque, from the start of the phase [s], shape (count,), float64.
-        torques: of the drive then, towards greater theta of the outer link [N m], shape (count,), float64.
-        scene: number of the scene in a batch.
-    """
-
-    inner: Index = field(metadata=of("nodes"))
-    outer: Index = field(metadata=of("nodes"))
-    friction: float = field(metadata=AS_IS)
-    damping: float = field(metadata=AS_IS)
-    friction_rate: float = field(metadata=AS_IS)
-    times: Array = field(metadata=AS_IS)
-    torques: Array = field(metadata=AS_IS)
-    scene: int = field(default=0, metadata=SCENE)
-
-
-@joinable
-@dataclass(frozen=True, kw_only=True)
-class MovableBase:
-    """A ground hinge that moves by a table, slides along a direction, or both.
-
-    Attributes:
-        start, end: its nodes are those of the pairs [start, end) of `Model.joint_first`.
-        coupling: place in `Model.couplings` of its hinge with a pin, -1 without.
-        direction: of the slide, a unit vector [-], shape (3,), float64; 0 where it does not slide.
-        carriage_mass: [kg].
-        times: of the base's motion, from the start of the phase [s], shape (count,), float64.
-        velocities: of the base then, x and y [m/s], shape (count, 2), float64.
-        scene: number of the scene in a batch.
-    """
-
-    start: int = field(metadata=of("pairs"))
-    end: int = field(metadata=of("pairs"))
-    direction: Array = field(metadata=AS_IS)
-    carriage_mass: float = field(metadata=AS_IS)
-    times: Array = field(metadata=AS_IS)
-    velocities: Array = field(metadata=AS_IS)
-    coupling: int = field(default=-1, metadata=of("couplings"))
-    scene: int = field(default=0, metadata=SCENE)
-
-
 def _shifted(table: Table | None, start: float, rest: Array) -> tuple[Array, Array]:
     """Times from the start of the phase and values of a table; `rest` is the value without one."""
     if table is None:
@@ -83,7 +30,7 @@ def _shifted(table: Table | None, start: float, rest: Array) -> tuple[Array, Arr
     return table.times - start, table.values
 
 
-def hinge_loads(parts: Assembly, free: NDArray[np.bool_], chain: Chain | None, start: float) -> tuple[HingeLoad, ...]:
+def hinge_loads(parts: Bodies, free: NDArray[np.bool_], chain: Chain | None, start: float) -> tuple[HingeLoad, ...]:
     """The chain's hinges in which torque or friction acts, for a phase that starts so long after the release [s].
 
     `free` are nodes that no joint ties and nothing holds or drives, shape (node_count,).
@@ -118,7 +65,7 @@ def hinge_loads(parts: Assembly, free: NDArray[np.bool_], chain: Chain | None, s
     return tuple(found)
 
 
-def _near(parts: Assembly, free: NDArray[np.bool_], body: str, hinge: Vec2) -> Index:
+def _near(parts: Bodies, free: NDArray[np.bool_], body: str, hinge: Vec2) -> Index:
     """Free nodes of a body as near to a hinge's axis as the body is thick there, more if these are on a line along z.
 
     Raises:
@@ -137,7 +84,7 @@ def _near(parts: Assembly, free: NDArray[np.bool_], body: str, hinge: Vec2) -> I
 
 
 def movable_bases(
-    parts: Assembly, joints: tuple[JointPairs, ...], couplings: Sequence[Coupling], chain: Chain | None, start: float
+    parts: Bodies, joints: tuple[JointPairs, ...], couplings: Sequence[Coupling], chain: Chain | None, start: float
 ) -> tuple[MovableBase, ...]:
     """The chain's base, if it moves or slides, for a phase that starts so long after the release [s].
 

@@ -3,60 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
-from warp_mca.base.joining import AS_IS, SCENE, joinable, of
-from warp_mca.model.assembly import Assembly
 from warp_mca.scene.loads import LOADS, Load
+from warp_mca.system.bodies import Bodies
+from warp_mca.system.loads import LoadedNodes
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
-
-
-@joinable
-@dataclass(frozen=True, kw_only=True)
-class LoadedNodes:
-    """Arrays of one load, to which a kind adds its own, each with a rule of `base/joining.py`.
-
-    Attributes:
-        node: on which it acts, shape (count,), int32.
-        on_nodes: whether it acts on any at all.
-        scene: number of the scene in a batch.
-        name: of the load, for columns of the history.
-    """
-
-    node: NDArray[np.int32] = field(metadata=of("nodes"))
-    scene: int = field(default=0, metadata=SCENE)
-    name: str = field(default="", metadata=AS_IS)
-    on_nodes: ClassVar[bool] = True
-
-    def impulse(self, duration: float) -> float:
-        """Impulse that it gives to a free body until then at most [N s]; 0 where nothing is known of it."""
-        return 0.0
-
-    def eigenvalues(self, mass: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What it adds at each of its nodes to the eigenvalue that bounds the stable step [1/s^2], shape (count,).
-
-        `mass` is that of all nodes [kg], shape (node_count,).
-        """
-        return np.zeros(len(self.node))
-
-    def decays(self, mass: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Rate of decay of its dashpots at each of its nodes, as part of M^-1 C [1/s], shape (count,).
-
-        They read the velocity of half a step before. `mass` as above.
-        """
-        return np.zeros(len(self.node))
+    from warp_mca.system.model import Model
 
 
 def loaded_nodes(
-    parts: Assembly, start: float, added: NDArray[np.float64], several_rates: bool
+    parts: Bodies, start: float, added: NDArray[np.float64], several_rates: bool
 ) -> dict[str, tuple[LoadedNodes, ...]]:
     """The loads of a scene by kind, for a phase that starts so long after the release [s].
 
@@ -80,7 +43,7 @@ def loaded_nodes(
     return {kind: tuple(found[kind]) for kind in sorted(found)}
 
 
-def _arrays(load: Load, parts: Assembly, start: float, added: NDArray[np.float64]) -> LoadedNodes:
+def _arrays(load: Load, parts: Bodies, start: float, added: NDArray[np.float64]) -> LoadedNodes:
     """Those of a load, with its nodes as they may be, and what it adds to the eigenvalues."""
     item = load.build(parts, start)
     if not isinstance(item, LoadedNodes):

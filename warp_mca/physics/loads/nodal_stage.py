@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from warp_mca.base.arrays import Array
 from warp_mca.base.joining import offsets
 from warp_mca.kernels.records.entries import list_entries, sum_entries
-from warp_mca.model.columns import added_columns
-from warp_mca.physics.actor import Actor, When
-from warp_mca.step.stage import BEYOND, Stage, Step
+from warp_mca.system.actor import Actor, When
+from warp_mca.system.columns import added_columns
+from warp_mca.system.stage import BEYOND, Stage, Step
 
 if TYPE_CHECKING:
-    from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.actor import System
+    from warp_mca.system.state import State
 
 
 class NodalLoad(Actor):
@@ -35,7 +35,7 @@ class NodalLoad(Actor):
     place: ClassVar[str] = "forces"
     stream: ClassVar[str] = BEYOND
 
-    def __init__(self, solver: Solver, name: str) -> None:
+    def __init__(self, solver: System, name: str) -> None:
         """Allocate on the current device."""
         self.solver, self.name, self.work = solver, name, solver.work
         self.items: Sequence[Any] = solver.model.loads[name]

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from warp_mca.base.arrays import Array
 from warp_mca.base.joining import AS_IS, joinable, offsets
 from warp_mca.kernels.loads.amplitude import Tables
-from warp_mca.physics.loads.nodal import LoadedNodes
 from warp_mca.physics.loads.nodal_stage import NodalLoad
-from warp_mca.step.stage import Step
+from warp_mca.system.loads import LoadedNodes
+from warp_mca.system.stage import Step
 
 if TYPE_CHECKING:
-    from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.actor import System
+    from warp_mca.system.state import State
 
 Index = NDArray[np.int32]
 
@@ -85,7 +85,7 @@ class PushedNodes(NodalLoad):
         order: entries of `listed` by node, of which those of each begin at `begin`.
     """
 
-    def __init__(self, solver: Solver, name: str) -> None:
+    def __init__(self, solver: System, name: str) -> None:
         """Allocate on the current device."""
         self.node, self.order, self.begin = grouped(self.listed(solver.model.loads[name]))
         super().__init__(solver, name)

@@ -10,10 +10,10 @@ from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
 from warp_mca.base.joining import AS_IS, joinable
 from warp_mca.geometry.point_location import around_point, weighted_set
-from warp_mca.model.assembly import Assembly
-from warp_mca.physics.loads.nodal import LoadedNodes
 from warp_mca.physics.loads.springs_stage import SpringsStage as Stage
 from warp_mca.scene.springs import Spring
+from warp_mca.system.bodies import Bodies
+from warp_mca.system.loads import LoadedNodes
 
 __all__ = ["SpringNodes", "Stage", "build"]
 
@@ -63,7 +63,7 @@ class SpringNodes(LoadedNodes):
         return self.decay
 
 
-def build(load: Spring, assembly: Assembly) -> SpringNodes:
+def build(load: Spring, assembly: Bodies) -> SpringNodes:
     """The arrays of a spring.
 
     Raises:
@@ -112,7 +112,7 @@ def build(load: Spring, assembly: Assembly) -> SpringNodes:
 
 
 def _point(
-    assembly: Assembly, load: Spring, key: str, body: str, at: tuple[float, ...] | None, nodes: str | None
+    assembly: Bodies, load: Spring, key: str, body: str, at: tuple[float, ...] | None, nodes: str | None
 ) -> tuple[Index, Array]:
     """Nodes of a point, each once, and their weights, which add up to 1."""
     mesh, first = assembly.meshes[body], assembly.node_start[body]
@@ -125,7 +125,7 @@ def _point(
     return own + first, np.bincount(place, weight).astype(np.float64)
 
 
-def _lightness(assembly: Assembly, body: str, node: Index, weight: Array, n: Array) -> float:
+def _lightness(assembly: Bodies, body: str, node: Index, weight: Array, n: Array) -> float:
     """Acceleration of a point along n per force on it [1/kg]: of nodes by themselves, or of a rigid body."""
     if not assembly.scene.body(body).rigid:
         return float((weight**2 / assembly.mass[node]).sum())

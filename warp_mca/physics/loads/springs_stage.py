@@ -12,11 +12,11 @@ import warp as wp
 from warp_mca.base.joining import offsets
 from warp_mca.kernels.nodes import spring
 from warp_mca.physics.loads.nodal_stage import NodalLoad
-from warp_mca.step.stage import Step
+from warp_mca.system.stage import Step
 
 if TYPE_CHECKING:
-    from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.actor import System
+    from warp_mca.system.state import State
 
 BLOCK = 256  # threads of a GPU for the springs of a scene
 
@@ -45,7 +45,7 @@ class SpringsState:
 class SpringsStage(NodalLoad):
     """All springs between points."""
 
-    def __init__(self, solver: Solver, name: str) -> None:
+    def __init__(self, solver: System, name: str) -> None:
         """Allocate on the current device."""
         super().__init__(solver, name)
         items, own = self.items, spring.Springs()

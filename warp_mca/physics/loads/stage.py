@@ -14,14 +14,14 @@ from warp_mca.base.joining import offsets
 from warp_mca.base.rotation import point_velocity
 from warp_mca.kernels.nodes import base, joint_torque
 from warp_mca.kernels.records import loads
-from warp_mca.physics.actor import Actor, When
-from warp_mca.step.stage import BESIDE, Stage, Step
+from warp_mca.system.actor import Actor, When
+from warp_mca.system.stage import BESIDE, Stage, Step
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
-    from warp_mca.physics.loads.joint_loads import MovableBase
-    from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.actor import System
+    from warp_mca.system.loads import MovableBase
+    from warp_mca.system.model import Model
+    from warp_mca.system.state import State
 
 BLOCK = 256  # threads of a GPU for the hinges of a scene
 
@@ -78,7 +78,7 @@ class LoadStage(Actor):
         latest: impulse of each coupling in this step [N s], shape (coupling_count,), vec3d; empty without pinned bases.
     """
 
-    def __init__(self, solver: Solver) -> None:
+    def __init__(self, solver: System) -> None:
         """Allocate on the current device."""
         model, self.scenes = solver.model, solver.layout.count
         self.hinges, self.bases = model.hinge_loads, model.bases

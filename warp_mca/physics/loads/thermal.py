@@ -15,19 +15,19 @@ from warp_mca.base.errors import bad_value
 from warp_mca.base.joining import AS_IS, joinable, offsets
 from warp_mca.kernels.loads.thermal import Heated, Kept, heat_kernel, work_kernel
 from warp_mca.kernels.materials.laws import law_functions
-from warp_mca.model.assembly import Assembly
-from warp_mca.model.block import Block
-from warp_mca.physics.actor import When
 from warp_mca.physics.loads.nodal_stage import NodalLoad
 from warp_mca.physics.loads.pushed import TimedNodes, tables_of
 from warp_mca.scene.loads import ThermalStrain
-from warp_mca.step.stage import Stage as StepStage
-from warp_mca.step.stage import Step
+from warp_mca.system.actor import When
+from warp_mca.system.block import Block
+from warp_mca.system.bodies import Bodies
+from warp_mca.system.stage import Stage as StepStage
+from warp_mca.system.stage import Step
 
 if TYPE_CHECKING:
     from warp_mca.physics.elements.stage import ElementStage
-    from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.actor import System
+    from warp_mca.system.state import State
 
 
 @joinable
@@ -61,7 +61,7 @@ class ThermalState:
     clock: wp.array
 
 
-def build(load: ThermalStrain, assembly: Assembly) -> HeatedBody:
+def build(load: ThermalStrain, assembly: Bodies) -> HeatedBody:
     """Arrays of a load.
 
     Raises:
@@ -94,7 +94,7 @@ def _heated(block: Block) -> tuple[Index, Index, Array] | None:
 class Stage(NodalLoad):
     """Device side of thermal strains: their elements, block by block."""
 
-    def __init__(self, solver: Solver, name: str) -> None:
+    def __init__(self, solver: System, name: str) -> None:
         """Allocate on the current device."""
         model = solver.model
         items: Any = model.loads[name]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -11,61 +10,19 @@ from numpy.typing import NDArray
 
 from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
-from warp_mca.base.joining import AS_IS, SCENE, joinable, of
-from warp_mca.model.assembly import GROUND, Assembly
-from warp_mca.physics.contact.surfaces import ContactPass
-from warp_mca.physics.joints.constraints import JointPairs
-from warp_mca.physics.joints.couplings import Coupling
-from warp_mca.physics.loads.joint_loads import MovableBase
-from warp_mca.physics.loads.nodal import LoadedNodes
-from warp_mca.physics.rigid.body_joints import BodyJoint
 from warp_mca.physics.rigid.joining import join_whole
-from warp_mca.physics.rigid.rows import RigidPin, RigidRow, check_joint, fixed_rows, joint_rows, pin_of, pin_rows
+from warp_mca.physics.rigid.rows import check_joint, fixed_rows, joint_rows, pin_of, pin_rows
 from warp_mca.scene import Scene
+from warp_mca.system.bodies import GROUND, Bodies
+from warp_mca.system.body_joints import BodyJoint
+from warp_mca.system.contact import ContactPass
+from warp_mca.system.joints import Coupling, JointPairs
+from warp_mca.system.loads import LoadedNodes, MovableBase
+from warp_mca.system.rigid import RigidBody, RigidPin, RigidRow
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
     from warp_mca.rigid.chain import Chain
-
-
-@joinable
-@dataclass(frozen=True, kw_only=True)
-class RigidBody:
-    """A rigid body with its riders: nodes of flexible bodies that joints tie to its own nodes.
-
-    Attributes:
-        name: of the body.
-        own: its nodes, shape (node_count,), int32.
-        loaded: those among them on which contact or loads may act, int32.
-        riders: shape (rider_count,), int32.
-        pairs: pair of `Model.joint_first` that ties each rider, shape (rider_count,), int32.
-        signs: 1 where a rider is the first node of its pair, -1 where it is the second, shape (rider_count,), float64.
-        mass: of nodes and riders [kg].
-        centre: of this mass at the reference positions [m], shape (3,), float64.
-        inertia: about the centre, J = sum m (r . r I - r r^T) [kg m^2], shape (3, 3), float64.
-        scene: number of the scene in a batch.
-    """
-
-    name: str = field(metadata=AS_IS)
-    own: Index = field(metadata=of("nodes"))
-    loaded: Index = field(metadata=of("nodes"))
-    riders: Index = field(metadata=of("nodes"))
-    pairs: Index = field(metadata=of("pairs"))
-    signs: Array = field(metadata=AS_IS)
-    mass: float = field(metadata=AS_IS)
-    centre: Array = field(metadata=AS_IS)
-    inertia: Array = field(metadata=AS_IS)
-    scene: int = field(default=0, metadata=SCENE)
-
-    @property
-    def radius(self) -> float:
-        """Of inertia [m]."""
-        return float(np.sqrt(0.5 * np.trace(self.inertia) / self.mass))
-
-    @property
-    def nodes(self) -> Index:
-        """All that move with the body, shape (node_count + rider_count,), int32."""
-        return np.concatenate([self.own, self.riders]).astype(np.int32)
+    from warp_mca.system.model import Model
 
 
 class Rigid(NamedTuple):
@@ -77,7 +34,7 @@ class Rigid(NamedTuple):
     body_joints: tuple[BodyJoint, ...] = ()
 
 
-def own_nodes(parts: Assembly) -> dict[str, Index]:
+def own_nodes(parts: Bodies) -> dict[str, Index]:
     """Nodes of each rigid body of a scene, by name."""
     start, meshes = parts.node_start, parts.meshes
     return {
@@ -112,7 +69,7 @@ def moves_with_rigid(model: Model) -> NDArray[np.bool_]:
 
 
 def rigid_bodies(
-    parts: Assembly,
+    parts: Bodies,
     pairs: Mapping[str, NDArray],
     joints: Sequence[JointPairs],
     couplings: Sequence[Coupling],
@@ -164,7 +121,7 @@ def rigid_bodies(
     return Rigid(tuple(bodies), (*rows, *whole.rows), (*pins, *whole.pins), whole.joints)
 
 
-def _check_drives(parts: Assembly) -> None:
+def _check_drives(parts: Bodies) -> None:
     for item in parts.scene.prescribed:
         if parts.scene.body(item.body).rigid:
             remedy = "its nodes move as one rigid body, which no table drives; give it a velocity, or leave rigid off"
@@ -193,7 +150,7 @@ def check_loads(scene: Scene, chain: Chain | None, bases: Sequence[MovableBase])
 
 
 def _body(
-    parts: Assembly, name: str, own: Index, touched: NDArray[np.bool_], pairs: Mapping[str, NDArray], owner: Index
+    parts: Bodies, name: str, own: Index, touched: NDArray[np.bool_], pairs: Mapping[str, NDArray], owner: Index
 ) -> RigidBody:
     first, second = pairs["joint_first"], pairs["joint_second"]
     place = owner[own[0]]

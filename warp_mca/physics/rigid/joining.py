@@ -12,16 +12,16 @@ from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
 from warp_mca.base.rotation import mean_spin, point_velocity, rotation_matrix
 from warp_mca.kernels.nodes import joint_arrays as columns
-from warp_mca.model.assembly import GROUND, Assembly
-from warp_mca.physics.joints.constraints import JointPairs
-from warp_mca.physics.rigid.body_joints import BodyJoint, exponential
-from warp_mca.physics.rigid.rows import RigidPin, RigidRow
 from warp_mca.scene.amplitude import CONSTANT, Amplitude
 from warp_mca.scene.freedoms import Controller, Freedom, PositionServo, Whole
 from warp_mca.scene.joints import Joint
+from warp_mca.system.bodies import GROUND, Bodies
+from warp_mca.system.body_joints import BodyJoint, exponential
+from warp_mca.system.joints import JointPairs
+from warp_mca.system.rigid import RigidPin, RigidRow
 
 if TYPE_CHECKING:
-    from warp_mca.physics.rigid.bodies import RigidBody
+    from warp_mca.system.rigid import RigidBody
 
 APART = 1e-6  # of a joint's extent: distance of the points of both bodies, at most
 ASTRAY = 1e-6  # of the speeds of both bodies: part of their relative motion that a joint does not allow, at most
@@ -38,7 +38,7 @@ class Joined(NamedTuple):
 
 
 def join_whole(
-    parts: Assembly, pairs: Mapping[str, NDArray], found: Sequence[JointPairs], bodies: Sequence[RigidBody],
+    parts: Bodies, pairs: Mapping[str, NDArray], found: Sequence[JointPairs], bodies: Sequence[RigidBody],
     velocity: Array, first_pin: int,
 ) -> Joined:  # fmt: skip
     """The joints between whole bodies of a scene.
@@ -85,7 +85,7 @@ def join_whole(
     return Joined(tuple(joints), tuple(rows), tuple(pins))
 
 
-def _frame(parts: Assembly, body: str | None) -> tuple[Array, Array]:
+def _frame(parts: Bodies, body: str | None) -> tuple[Array, Array]:
     """Rotation of a body's frame at the start, shape (3, 3), and the place of its origin [m], shape (3,)."""
     if body is None:
         return np.eye(3), np.zeros(3)
@@ -94,7 +94,7 @@ def _frame(parts: Assembly, body: str | None) -> tuple[Array, Array]:
 
 
 def _body_joint(
-    parts: Assembly, joint: Joint, whole: Whole, bodies: Sequence[RigidBody], a: int, b: int, pin: int
+    parts: Bodies, joint: Joint, whole: Whole, bodies: Sequence[RigidBody], a: int, b: int, pin: int
 ) -> BodyJoint:
     R, origin = _frame(parts, joint.body)
     place = origin + R @ np.array(whole.at)
@@ -175,7 +175,7 @@ def _quaternion(R: Array) -> Array:
     return np.asarray(Rotation.from_matrix(R).as_quat(), dtype=np.float64)
 
 
-def _pin(parts: Assembly, joint: Joint, item: BodyJoint, own: JointPairs, body: int, nodes: Index) -> RigidPin:
+def _pin(parts: Bodies, joint: Joint, item: BodyJoint, own: JointPairs, body: int, nodes: Index) -> RigidPin:
     """The cluster of a joint's flexible side, all of whose nodes weigh as their mass.
 
     Raises:
@@ -200,7 +200,7 @@ def _pin(parts: Assembly, joint: Joint, item: BodyJoint, own: JointPairs, body: 
 
 
 def _check_motion(
-    joint: Joint, item: BodyJoint, bodies: Sequence[RigidBody], parts: Assembly, velocity: Array, nodes: Index
+    joint: Joint, item: BodyJoint, bodies: Sequence[RigidBody], parts: Bodies, velocity: Array, nodes: Index
 ) -> None:
     """Refuse bodies whose velocities at the start a joint does not allow.
 

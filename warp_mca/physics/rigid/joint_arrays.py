@@ -14,15 +14,15 @@ from warp_mca.base.joining import offsets
 from warp_mca.kernels.nodes.joint_arrays import LOADS, JointPoses, JointStep, RigidJoints
 from warp_mca.kernels.nodes.screws import Twist
 from warp_mca.kernels.records.entries import list_entries, sum_entries
-from warp_mca.model.columns import JOINTS, added_columns
 from warp_mca.physics.loads.pushed import tables_of
-from warp_mca.step.stage import Stage, Step
+from warp_mca.system.columns import JOINTS, added_columns
+from warp_mca.system.stage import Stage, Step
 
 if TYPE_CHECKING:
-    from warp_mca.physics.rigid.body_joints import BodyJoint
-    from warp_mca.physics.rigid.rows import RigidRow
-    from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.actor import System
+    from warp_mca.system.body_joints import BodyJoint
+    from warp_mca.system.rigid import RigidRow
+    from warp_mca.system.state import State
 
 
 ROUNDING = 1e-15  # opening that counts as closed, over the greatest arm of a joint: a few units of float64
@@ -66,7 +66,7 @@ class JointArrays:
 
     def __init__(
         self,
-        solver: Solver,
+        solver: System,
         items: Sequence[BodyJoint],
         group_of: Sequence[int],
         rows: Sequence[RigidRow],

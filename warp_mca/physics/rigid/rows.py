@@ -3,73 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
-from warp_mca.base.joining import AS_IS, joinable, of
-from warp_mca.model.assembly import GROUND, Assembly
-from warp_mca.physics.joints.constraints import JointPairs
-from warp_mca.physics.joints.couplings import Coupling
 from warp_mca.scene.joints import Joint
+from warp_mca.system.bodies import GROUND, Bodies
+from warp_mca.system.joints import Coupling, JointPairs
+from warp_mca.system.rigid import RigidPin, RigidRow
 
 HELD = 1e-4  # least share of a rigid motion that shows at fixed axes
 APART = 1e-6  # of the extent of a joint's nodes: distance at which two of them differ
-
-
-@joinable
-@dataclass(frozen=True, kw_only=True)
-class RigidRow:
-    """A scalar condition of `kernels.nodes.rigid_rows`.
-
-    Attributes:
-        first, second: places of the bodies in `Model.rigid_bodies`; second is GROUND for the ground.
-        point: reference position of the common point [m], shape (3,), float64.
-        direction: n at the reference positions [-], shape (3,), float64.
-        pair: of `Model.joint_first` that takes the impulse, -1 where none does.
-        sign: of this impulse: -1 where the first body is the second one of its joint.
-        pin: place in `Model.rigid_pins` of the cluster that stands in for the second body, -1 without one.
-        twist: axis of a row that holds a direction of a pin [-], shape (3,), float64; n is 0 there.
-        joint: place in `Model.body_joints` of the joint that finds the direction itself, -1 of other rows.
-        rate: of that joint that the row holds back, -1 of rows that hold the joint.
-    """
-
-    first: int = field(metadata=of("rigid bodies"))
-    second: int = field(metadata=of("rigid bodies"))
-    point: Array = field(metadata=AS_IS)
-    direction: Array = field(metadata=AS_IS)
-    pair: int = field(default=-1, metadata=of("pairs"))
-    sign: float = field(default=1.0, metadata=AS_IS)
-    pin: int = field(default=-1, metadata=of("rigid pins"))
-    twist: Array = field(default_factory=lambda: np.zeros(3), metadata=AS_IS)
-    joint: int = field(default=-1, metadata=of("body joints"))
-    rate: int = field(default=-1, metadata=AS_IS)
-
-
-@joinable
-@dataclass(frozen=True, kw_only=True)
-class RigidPin:
-    """A pin between a rigid body and a cluster of nodes of a flexible one.
-
-    Attributes:
-        body: place of the rigid body in `Model.rigid_bodies`.
-        start, end: nodes of the cluster are those of the pairs [start, end) of `Model.joint_first`.
-        weight: of each of these, shape (end - start,), float64; this and the following are as in `Coupling`.
-        place: [m], shape (3,), float64.
-        axis: [-], shape (3,), float64.
-        arm: from the mean position of the cluster [m], shape (3,), float64.
-    """
-
-    body: int = field(metadata=of("rigid bodies"))
-    start: int = field(metadata=of("pairs"))
-    end: int = field(metadata=of("pairs"))
-    weight: Array = field(metadata=AS_IS)
-    place: Array = field(metadata=AS_IS)
-    axis: Array = field(metadata=AS_IS)
-    arm: Array = field(metadata=AS_IS)
 
 
 def check_joint(joint: Joint, pairs: Mapping[str, NDArray], found: JointPairs, owner: Index, coupled: bool) -> None:
@@ -115,7 +61,7 @@ def pin_rows(pin: RigidPin, place: int, pair: int, second: bool) -> list[RigidRo
 
 
 def joint_rows(
-    parts: Assembly, pairs: Mapping[str, NDArray], found: JointPairs, owner: Index, coupling: Coupling | None
+    parts: Bodies, pairs: Mapping[str, NDArray], found: JointPairs, owner: Index, coupling: Coupling | None
 ) -> list[RigidRow]:
     """Independent rows that hold the common nodes of two rigid bodies, or of one and the ground, together.
 
@@ -157,7 +103,7 @@ def across(along: Array) -> Array:
     return np.stack([one, np.cross(along, one)])
 
 
-def fixed_rows(parts: Assembly, place: int, name: str, centre: Array, radius: float, velocity: Array) -> list[RigidRow]:
+def fixed_rows(parts: Bodies, place: int, name: str, centre: Array, radius: float, velocity: Array) -> list[RigidRow]:
     """Independent rows that hold the fixed axes of a rigid body's nodes.
 
     Args:

@@ -16,19 +16,18 @@ from warp_mca.kernels.nodes import rigid_body
 from warp_mca.kernels.nodes.cluster import Clusters, Mean
 from warp_mca.kernels.nodes.rigid_motion import Poses, RigidBodies, RigidStep
 from warp_mca.kernels.nodes.rigid_rows import RigidRows
-from warp_mca.model.assembly import GROUND
-from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.rigid.joint_arrays import JointArrays, JointState
-from warp_mca.step.stage import BESIDE, Stage, Step
-from warp_mca.step.threads import NODES, Split, whole
+from warp_mca.system.actor import Actor, When
+from warp_mca.system.bodies import GROUND
+from warp_mca.system.stage import BESIDE, Stage, Step
+from warp_mca.system.threads import NODES, Split, whole
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
     from warp_mca.physics.joints.constraint_stage import ConstraintStage
-    from warp_mca.physics.rigid.bodies import RigidBody
-    from warp_mca.physics.rigid.rows import RigidPin, RigidRow
-    from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.actor import System
+    from warp_mca.system.model import Model
+    from warp_mca.system.rigid import RigidBody, RigidPin, RigidRow
+    from warp_mca.system.state import State
 
 
 BLOCK = 256  # threads of a GPU for a group of bodies
@@ -69,7 +68,7 @@ def groups_of(bodies: Sequence[RigidBody], rows: Sequence[RigidRow]) -> list[lis
 class RigidStage(Actor):
     """What `kernels.nodes.rigid_body` reads and writes; of no use for a model without rigid bodies."""
 
-    def __init__(self, solver: Solver) -> None:
+    def __init__(self, solver: System) -> None:
         """Allocate on the current device."""
         model, nodes = solver.model, solver.nodes
         self.model, self.nodes, self.work, self.dt = model, nodes, nodes.work, nodes.dt
@@ -106,7 +105,7 @@ class RigidStage(Actor):
         found.sign = wp.array(np.concatenate(signs), dtype=wp.float64)
         self.bodies = found
 
-    def _make_rows(self, solver: Solver, own: Sequence[RigidBody], unsorted: Sequence[RigidRow]) -> None:
+    def _make_rows(self, solver: System, own: Sequence[RigidBody], unsorted: Sequence[RigidRow]) -> None:
         groups = groups_of(own, unsorted)
         self.groups = len(groups)
         self.group_of = group_of = {k: g for g, group in enumerate(groups) for k in group}

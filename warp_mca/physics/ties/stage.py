@@ -9,12 +9,12 @@ import numpy as np
 import warp as wp
 
 from warp_mca.kernels.nodes import tied
-from warp_mca.physics.actor import Actor, When
 from warp_mca.physics.elements.stage import BLOCK_DIM
-from warp_mca.step.stage import BESIDE, Stage, Step
+from warp_mca.system.actor import Actor, When
+from warp_mca.system.stage import BESIDE, Stage, Step
 
 if TYPE_CHECKING:
-    from warp_mca.step.solver import Solver
+    from warp_mca.system.actor import System
 
 
 class TieStage(Actor):
@@ -26,7 +26,7 @@ class TieStage(Actor):
 
     block_dim = BLOCK_DIM
 
-    def __init__(self, solver: Solver) -> None:
+    def __init__(self, solver: System) -> None:
         """Allocate on the current device."""
         model, nodes = solver.model, solver.nodes
         self.nodes, self.count = nodes, len(model.ties)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from warp_mca.base.arrays import Array, Index
 from warp_mca.kernels.elements.viscosity import HEATED, VISCOUS
-from warp_mca.model.failing import Failing
+from warp_mca.system.failing import Failing
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,10 +9,13 @@ import numpy as np
 
 from warp_mca.base.arrays import Array
 from warp_mca.kernels.nodes.joint_arrays import ARMATURE, KP, LIMIT_STIFFNESS, STIFFNESS
-from warp_mca.model.assembly import GROUND, Assembly
-from warp_mca.model.stable_step import BOUNCE, USUAL_SCALE, StableStep
-from warp_mca.physics.rigid.bodies import Rigid, RigidBody
+from warp_mca.model.assembly import Assembly
+from warp_mca.model.stable_step import BOUNCE, USUAL_SCALE
+from warp_mca.physics.rigid.bodies import Rigid
 from warp_mca.scene import Contact, RigidPlane, Scene
+from warp_mca.system.bodies import GROUND
+from warp_mca.system.rigid import RigidBody
+from warp_mca.system.time_step import StableStep
 
 WHOLE = 100.0
 TURN = 0.01  # of a body in a step at most [rad]: its scheme is then off by some 1e-5 of the angle

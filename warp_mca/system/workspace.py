@@ -12,14 +12,14 @@ from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.nodes.floating import Frames
 from warp_mca.kernels.records.columns import JACOBIAN
 from warp_mca.kernels.records.ledger import SUM_WIDTH
-from warp_mca.model.columns import column_count
-from warp_mca.model.layout import Layout
-from warp_mca.model.model import Model
-from warp_mca.model.precision import limited
-from warp_mca.physics.loads.weight import heavy_mass
+from warp_mca.system.columns import column_count
+from warp_mca.system.layout import Layout
+from warp_mca.system.model import Model
+from warp_mca.system.precision import limited
+from warp_mca.system.weight import heavy_mass
 
 if TYPE_CHECKING:
-    from warp_mca.step.state import State
+    from warp_mca.system.state import State
 
 ROWS = 32  # records kept on the device before the host reads them
 ALL = slice(None)

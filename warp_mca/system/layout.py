@@ -13,7 +13,7 @@ from warp_mca.base.arrays import Index
 from warp_mca.base.joining import offsets
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
+    from warp_mca.system.model import Model
 
 
 @dataclass(frozen=True, kw_only=True)

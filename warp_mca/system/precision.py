@@ -11,7 +11,7 @@ from warp_mca.base.errors import bad_value
 from warp_mca.geometry.boxes import cell_boxes
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
+    from warp_mca.system.model import Model
 
 
 # Elements take the fourth power of lengths and the square of stresses, which float32 holds from 1e-38 to 3e38.

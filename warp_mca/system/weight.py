@@ -9,7 +9,7 @@ import numpy as np
 from warp_mca.base.arrays import Array
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
+    from warp_mca.system.model import Model
 
 
 def nodal_gravity(model: Model) -> Array | None:

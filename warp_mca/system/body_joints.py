@@ -16,7 +16,7 @@ from warp_mca.kernels.nodes import joint_arrays as columns
 from warp_mca.scene.amplitude import Amplitude
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
+    from warp_mca.system.model import Model
 
 
 @joinable

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import warp as wp
 
-from warp_mca.step.threads import Split, whole
+from warp_mca.system.threads import Split, whole
 
 if TYPE_CHECKING:
-    from warp_mca.step.state import State
+    from warp_mca.system.state import State
 
 # Streams of a GPU; a CPU runs stages one by one. The main one waits for BESIDE and ASIDE at the end of their group, for
 # BEYOND at the end of the next, for SUMS, SHOWN, SPRINGS and LISTS at the end of the step, for LAST at the end of the

@@ -7,23 +7,17 @@ from dataclasses import dataclass, field
 
 from warp_mca.base.arrays import Array, Index
 from warp_mca.base.joining import ALONE, AS_IS, GIVEN, ITEMS, PART, joinable, of, offsets_of
-from warp_mca.model.block import Block
-from warp_mca.model.layout import Layout
-from warp_mca.model.mass_scaling import MassScaling
-from warp_mca.model.rates import Rates
-from warp_mca.model.stable_step import StableStep
-from warp_mca.physics.absorbing.nodes import AbsorbingNodes
-from warp_mca.physics.contact.auto_penalty import ChosenPenalty
-from warp_mca.physics.contact.surfaces import ContactPass
-from warp_mca.physics.floating.frames import FloatingFrames
-from warp_mca.physics.joints.constraints import JointPairs
-from warp_mca.physics.joints.couplings import Coupling
-from warp_mca.physics.loads.joint_loads import HingeLoad, MovableBase
-from warp_mca.physics.loads.nodal import LoadedNodes
-from warp_mca.physics.rigid.bodies import RigidBody
-from warp_mca.physics.rigid.body_joints import BodyJoint
-from warp_mca.physics.rigid.rows import RigidPin, RigidRow
-from warp_mca.physics.ties.nodes import TiedNodes
+from warp_mca.system.absorbing import AbsorbingNodes
+from warp_mca.system.block import Block
+from warp_mca.system.body_joints import BodyJoint
+from warp_mca.system.contact import ChosenPenalty, ContactPass
+from warp_mca.system.floating import FloatingFrames
+from warp_mca.system.joints import Coupling, JointPairs
+from warp_mca.system.layout import Layout
+from warp_mca.system.loads import HingeLoad, LoadedNodes, MovableBase
+from warp_mca.system.rigid import RigidBody, RigidPin, RigidRow
+from warp_mca.system.ties import TiedNodes
+from warp_mca.system.time_step import MassScaling, Rates, StableStep
 
 
 @joinable

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from warp_mca.kernels.records.columns import PASS, PASS_COLUMNS
-from warp_mca.physics.rigid.body_joints import BodyJoint
-from warp_mca.physics.rigid.body_joints import readings as joint_readings
 from warp_mca.scene.loads import LOADS
+from warp_mca.system.body_joints import BodyJoint
+from warp_mca.system.body_joints import readings as joint_readings
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
+    from warp_mca.system.model import Model
 
 
 JOINTS = "joints"  # name of the actor whose columns are those of joints between whole bodies

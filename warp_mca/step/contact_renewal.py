@@ -18,9 +18,9 @@ from warp_mca.physics.contact.actor import stage_of
 from warp_mca.physics.contact.skin_edges import EdgePass
 
 if TYPE_CHECKING:
-    from warp_mca.physics.contact.surfaces import ContactPass
     from warp_mca.step.solver import Solver
-    from warp_mca.step.state import State
+    from warp_mca.system.contact import ContactPass
+    from warp_mca.system.state import State
 
 Springs = dict[str, NDArray]
 

@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import bad_value
 from warp_mca.base.files import write_atomically
 from warp_mca.base.validate import DAMAGE, MAX_COUNT
-from warp_mca.step.records import SceneRecords
+from warp_mca.system.records import SceneRecords
 
 if TYPE_CHECKING:
-    from warp_mca.model.model import Model
+    from warp_mca.system.model import Model
 
 FORMAT = "warp_mca state 1"
 
