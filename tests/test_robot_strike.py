@@ -11,6 +11,7 @@ import warp_mca as mca
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.cli.main import main
 from warp_mca.robots.geoms import filled, geom_surface, hull
+from warp_mca.scene.model_file import load, save
 from warp_mca.verify.machines import ARM, STOP, robot, write_stl
 
 mujoco = pytest.importorskip("mujoco")
@@ -167,6 +168,7 @@ def test_meshes_that_do_not_fit_the_file_are_refused_with_figures(tmp_path, tool
         ('<body name="fore"', '<body name="fore" gravcomp="1"', "gravcomp of link fore"),
         ('<joint name="j3"', '<joint name="j3" actuatorfrcrange="-1 1"', "actuatorfrcrange of joint j3"),
         ("</worldbody>", f"</worldbody>{GEARED}", "equality"),
+        ('integrator="RK4"/>', 'integrator="RK4"><flag damper="disable"/></option>', "damper disabled"),
     ],
 )
 def test_what_an_impact_does_not_carry_is_refused_by_name(tmp_path, old, new, words):
@@ -182,6 +184,19 @@ def test_mistakes_at_the_hand_off_are_refused(tmp_path):
     held = arm(tmp_path, controller=lambda t, q, v: [0.0] * 6, period=1e-3)
     with pytest.raises(mca.RequestError, match=r"Robot\.period = 0\.001: controls are held during an impact"):
         held.strike(impact=IMPACT)
+
+
+def test_a_model_file_holds_what_was_handed_over(tmp_path):
+    """It needs no MuJoCo to run: bodies, joints with their drives, contacts with their stiffness."""
+    machine = arm(tmp_path, flexible={"tool": TOOL}, mounts={"tool": "start"})
+    scene = machine.strike(impact=IMPACT, swing=machine.swing(t_end=1e-3))
+    save(tmp_path / "arm.mca", scene, mca.mesh(scene))
+    stored = load(tmp_path / "arm.mca").scene
+    assert (stored.joints, stored.contacts, stored.gravity) == (scene.joints, scene.contacts, scene.gravity)
+    rigid = arm(tmp_path).strike(impact=IMPACT)
+    save(tmp_path / "rigid.mca", rigid, mca.mesh(rigid))
+    stored = load(tmp_path / "rigid.mca").scene
+    assert stored.contacts == rigid.contacts and stored.parameters == rigid.parameters
 
 
 def test_only_surfaces_that_may_touch_within_the_impact_are_meshed(tmp_path):

@@ -24,6 +24,10 @@ def refuse_at_hand_off(machine: Machine) -> None:
         RequestError: the machine has something of it.
     """
     model, names, mj = machine.model, machine.names, machine.mj
+    for flag in ("SPRING", "DAMPER", "CLAMPCTRL"):
+        if int(model.opt.disableflags) & int(getattr(mj.mjtDisableBit, f"mjDSBL_{flag}")):
+            remedy = "an impact has springs, dampers and clamps of controls; take this flag out of the file's option"
+            raise bad_value("Robot: flag", f"{flag.lower()} disabled", remedy)
     for k in range(1, model.nbody):
         if model.body_gravcomp[k]:
             raise bad_value(f"gravcomp of link {names.body(k)}", float(model.body_gravcomp[k]), "leave it out")
@@ -111,7 +115,7 @@ def _motor(machine: Machine, joint: int, zero: float) -> tuple[Amplitude | Posit
     if len(drives) > 1 and any(drive.limits for drive in drives):
         remedy = "actuators with a forcerange that share a joint are not carried; give the joint one"
         raise bad_value("Robot: actuators of joint", name, remedy)
-    constant, kp, kv = (float(sum(drive[k] for drive in drives)) for k in range(3))
+    constant, kp, kv = (float(v) for v in np.sum([drive[:3] for drive in drives], axis=0))
     limits = drives[0].limits
     if kp < 0.0 or kv < 0.0:
         remedy = "it drives the joint away from where it is; give a servo with kp and kv of 0 or above"

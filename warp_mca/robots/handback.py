@@ -112,7 +112,7 @@ class _Ends:
         for name, found in summary["rigid_bodies"].items():
             P, L = np.array(found["momentum"]), np.array(found["spin"])
             turned = rotation_matrix(found["rotation"])
-            spin = np.linalg.solve(turned @ np.array(found["inertia"]) @ turned.T, L)
+            spin = np.asarray(np.linalg.solve(turned @ np.array(found["inertia"]) @ turned.T, L), dtype=np.float64)
             self._turned[name] = rotation_matrix(-self.half * spin) @ turned
             own = 0.5 * float(P @ P) / found["mass"] + 0.5 * float(L @ self.spin(name, L))
             self.moved[name] = np.array(found["centre"]) - self.half * P / found["mass"], P, L, own
@@ -127,7 +127,8 @@ class _Ends:
     def spin(self, name: str, L: Array) -> Array:
         """Angular velocity of a rigid body at an angular momentum L about its centre [rad/s], shape (3,)."""
         turned = self._turned[name]
-        return np.linalg.solve(turned @ np.array(self._summary["rigid_bodies"][name]["inertia"]) @ turned.T, L)
+        inertia = turned @ np.array(self._summary["rigid_bodies"][name]["inertia"]) @ turned.T
+        return np.asarray(np.linalg.solve(inertia, L), dtype=np.float64)
 
     def origin(self, name: str) -> Array:
         """Of the frame of a rigid body at the end [m], shape (3,)."""

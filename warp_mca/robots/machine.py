@@ -211,8 +211,10 @@ class Machine:
     def mobility(self) -> Array:
         """Rates over generalised impulses at the latest data, M^-1 less what loops take, shape (nv, nv), float64."""
         inverse, J = np.linalg.inv(self.mass_matrix()), self.loop_jacobian()
-        W = inverse @ J.T
-        return inverse - W @ np.linalg.pinv(J @ W, rcond=1e-10, hermitian=True) @ W.T if len(J) else inverse
+        if len(J):
+            W = inverse @ J.T
+            inverse = inverse - W @ np.linalg.pinv(J @ W, rcond=1e-10, hermitian=True) @ W.T
+        return np.asarray(inverse, dtype=np.float64)
 
     def energies(self, y: Array) -> tuple[float, float]:
         """Kinetic energy, and that less works, plus the potential of gravity and springs, at y [J]."""

@@ -141,6 +141,8 @@ def _refused(mj: Any, model: Any) -> Iterator[str]:
     for k in range(model.neq):
         if model.eq_active0[k] and model.eq_type[k] not in [int(kind) for kind in kinds]:
             yield f"equality {names.equality(k)} is none of connect, weld and joint; take it out"
+    if model.opt.disableactuator:
+        yield "it switches groups of actuators off (actuatorgroupdisable of option); take these actuators out"
     if model.opt.density or model.opt.viscosity or model.opt.wind.any():
         yield "it moves in a fluid (density, viscosity or wind of option), which acts on no machine here; take it out"
 

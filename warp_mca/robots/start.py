@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -68,9 +68,7 @@ def _check_loops(machine: Machine) -> None:
             raise bad_value(f"Robot.{field}", "as given", remedy)
 
 
-def filled(
-    field: str, given: object, start: Array, names: list[str], places: Callable[[int], slice], what: str
-) -> Array:
+def filled(field: str, given: Any, start: Array, names: list[str], places: Callable[[int], slice], what: str) -> Array:
     """A copy of the vector `start` with what is given for it: all of it, or parts by the name of joint or actuator.
 
     Raises:
@@ -80,7 +78,7 @@ def filled(
     if given is None:
         return values
     if not isinstance(given, Mapping):
-        if not validate.is_list(given) or len(given) != len(start):  # pyright: ignore[reportArgumentType]
+        if not validate.is_list(given) or len(given) != len(start):
             remedy = f"give {len(start)} finite numbers, or some by the name of the {what}"
             raise bad_value(field, validate.brief(given), remedy)
         values[:] = given

@@ -172,7 +172,7 @@ class _Path:
         from scipy.integrate import DOP853  # whose import takes a tenth of a second
 
         machine, count = self._machine, self._machine.nq + self._machine.nv
-        tolerance = np.full(count + 2, SMALLEST * TOLERANCE)
+        tolerance: Any = np.full(count + 2, SMALLEST * TOLERANCE)
         tolerance[count:] = np.inf  # works are watched by the balance, not by the step
         solver = DOP853(machine.rates, self.times[-1], y, until, rtol=TOLERANCE, atol=tolerance)
         while solver.status == "running":

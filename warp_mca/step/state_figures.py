@@ -11,8 +11,8 @@ import numpy as np
 from warp_mca.base.rotation import rotation_vector
 
 if TYPE_CHECKING:
-    from warp_mca.system.model import Model
     from warp_mca.step.solver import Solver
+    from warp_mca.system.model import Model
     from warp_mca.system.state import State
 
 

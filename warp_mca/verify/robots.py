@@ -248,6 +248,7 @@ def arm_strike(setup: Setup) -> list[Row]:
         free = lambda item: replace(item, motor=None, damping=0.0)  # noqa: E731
         joints = tuple(replace(j, freedoms=tuple(map(free, j.freedoms))) for j in bare.joints)  # type: ignore[attr-defined]
         bare = replace(bare, joints=joints, gravity=(0.0, 0.0, 0.0))
+        assert found.touch is not None
         whole = 2.0 * found.touch.effective_mass * -float(found.touch.velocity @ found.touch.normal)
         impulse = _impulse(mca.run(bare, device=setup.device, precision="float64"))
         rows.append(Row("impulse at 1e9 N/m, no other forces", whole, (impulse,), "N s", 0.005, "the spring's time"))
