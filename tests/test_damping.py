@@ -213,7 +213,7 @@ def test_threads_and_batches_give_what_scenes_give_alone():
         ({"mass": -1.0}, r"Damping of bar.mass = -1.0: give a number from 0 to 1e"),
         ({"loss_factor": 0.1}, r"Damping of bar.band = None: give the frequencies"),
         ({"band": (1.0, 2.0), "mass": 1.0}, r"Damping of bar.loss_factor = 0.0: give that of the band"),
-        ({"loss_factor": 0.1, "band": (2.0, 1.0)}, r"Damping of bar.band = 'tuple': give two frequencies f1 < f2"),
+        ({"loss_factor": 0.1, "band": (2.0, 1.0)}, r"Damping of bar.band = \(2.0, 1.0\): give two frequencies f1 < f2"),
         ({"loss_factor": 0.9, "band": (1.0, 2.0)}, r"Damping of bar.loss_factor = 0.9: give a number from 0 to 0.5"),
         ({"mass": 1.0, "about": "air"}, r"Damping of bar.about = 'air': choose body or ground"),
     ],

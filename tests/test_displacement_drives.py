@@ -1,5 +1,6 @@
 """Displacements over time: where driven nodes are at the times of the table, and the wave that they send."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +51,21 @@ def test_velocities_are_continuous_and_lead_to_the_displacements():
     assert (way > -1e-12).all() and way.max() < WAY[1] + 1e-12  # no overshoot
     turns = np.isclose(times, TIMES[1])
     assert velocities[turns] == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize("scale", [0.9, 0.37])
+def test_short_pieces_of_a_table_of_velocities_move_nodes_by_their_integral(scale):
+    """Pulses shorter than a step, and corners within one: the way at the end is the integral, whatever the step."""
+    times = (0.0, 1.003e-6, 1.0035e-6, 1.004e-6, 5e-6, 5.0101e-6, 11.1e-6, 11.1001e-6)
+    velocities = (0.0, 0.0, 9.0, 0.0, 2.0, -3.0, -3.0, 0.0)
+    scene = driven(times=times, velocities=velocities)
+    phase = mca.ImpactPhase(duration=12e-6, output_interval=2e-7, time_step_scale=scale)
+    impact = finished(replace(scene, impact=phase), precision="float64")
+    way = float(np.trapezoid(velocities, times))
+    u = impact.state.u.numpy()[impact.solver.model.X[:, 0] == 0.0, 0]
+    np.testing.assert_allclose(u, way, rtol=1e-12)
+    energy = result_of(impact).summary["energy"]
+    assert abs(energy["error"]) < 2e-3 * energy["external_work"]
 
 
 def test_a_model_file_and_a_checkpoint_go_on_to_the_same_bits(tmp_path: Path):

@@ -201,9 +201,20 @@ def test_what_does_not_go_with_failure_is_refused():
         lambda: mca.PrincipalStressFailure(stress=float("nan")),
         lambda: mca.JohnsonCookFailure(D1=-1.0, D2=0.5, D3=0.0),
         lambda: mca.JohnsonCookFailure(D1=1.0, D2=0.5, D3=0.0, rate_0=0.0),
+        lambda: mca.JohnsonCookFailure(D1=1.0, D2=0.5, D3=0.0, least_strain=0.0),
     ):
         with pytest.raises(RequestError, match=r"Failure\.\w+ = "):
             make()
+
+
+def test_a_strain_at_failure_below_the_least_one_counts_as_this():
+    """In tension D1 + D2 exp(D3 / 3) is below 0: a bar breaks when another does that fails at the least strain."""
+    floor = mca.JohnsonCookFailure(D1=-0.3, D2=0.31, D3=-1.0, least_strain=0.02)
+    kinds = floor, mca.PlasticStrainFailure(strain=0.02), replace(floor, least_strain=1e-6)
+    found = [mca.run(pulled(replace(ALUMINIUM, failure=kind), 20.0, 2e-5)).summary["failure"]["bar"] for kind in kinds]
+    times = [own["time"] for own in found]
+    assert times[0] == pytest.approx(times[1], abs=2e-7)
+    assert times[2] < 0.5 * times[0]
 
 
 @dataclass(frozen=True, kw_only=True)

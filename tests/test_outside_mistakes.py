@@ -124,7 +124,7 @@ MISTAKES: tuple[tuple[Callable[[], mca.Scene], str], ...] = (
     (lambda: scene(law=kind(Penalty, damping=lambda *_: -1.0)()), r"Own.damping\(0.0025\) = -1.0: give a finite"),
     (
         lambda: scene(law=kind(Penalty, parameters=("a",))()),
-        r"Own.parameters = 'tuple': give a tuple of finite",
+        r"Own.parameters = \('a',\): give a tuple of finite",
     ),
 )
 
@@ -200,5 +200,5 @@ def test_what_a_class_lacks_is_named():
     whole = type("Own", (own,), {"history": lambda *_: None, "finish": lambda *_: None})
     with pytest.raises(mca.RequestError, match=r"^recorders\[0\] = 'Own': .*; this has no name, needs, cadence$"):
         mca.run(scene(), recorders=[mca.register(whole)()])
-    with pytest.raises(mca.RequestError, match=r"^register\.kind = 'list': choose among material"):
+    with pytest.raises(mca.RequestError, match=r"^register\.kind = \['recorder'\]: choose among material"):
         mca.register(whole, kind=["recorder"])  # pyright: ignore[reportArgumentType]

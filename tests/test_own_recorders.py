@@ -72,7 +72,7 @@ def test_options_that_are_none_are_refused(make: partial, words: str):
         ({"needs": None}, "needs = None: give a frozenset of what frames must hold, out of surface, contact"),
         ({"needs": "surface"}, "needs = 'surface': give a frozenset"),
         ({"needs": {"foo"}}, "needs = 'foo': give a frozenset"),
-        ({"needs": [["surface"]]}, "needs = 'list': give a frozenset"),
+        ({"needs": [["surface"]]}, "needs = ['surface']: give a frozenset"),
         ({"files": 5}, "files = 5: give a tuple of the paths that it writes"),
         ({"files": "a.txt"}, "files = 'a.txt': give a tuple"),
         ({"files": [None]}, "files[0] = None: name a file"),

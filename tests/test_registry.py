@@ -257,7 +257,7 @@ def test_async_functions_are_refused_without_warnings(tmp_path: Path):
         ("exit()", r"check\(\) failed with SystemExit"),
         ("None", r"block\.check\(\) = None: return a list"),
         ("'fine'", r"block\.check\(\) = 'fine': return a list"),
-        ("[1]", r"block\.check\(\) = 'list': return a list"),
+        ("[1]", r"block\.check\(\) = \[1\]: return a list"),
     ],
 )
 def test_a_check_that_fails_is_told_in_one_sentence(tmp_path: Path, body: str, words: str):

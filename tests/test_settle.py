@@ -236,3 +236,49 @@ def test_bodies_settle_under_loads_whose_work_is_counted(load: mca.Load):
     assert result.summary["energy_error"] < 1e-6
     stress = 1e6 if isinstance(load, mca.Traction) else 0.5 * 7850.0 * 1e5 * 0.05  # the mean of that of the bar
     assert result.probes[0].position[-1, 0] - 0.05 == pytest.approx(0.05 * stress / 210e9, rel=2e-3)
+
+
+def stretched(waits: bool, rigid: bool, rho: float) -> mca.Result:
+    """A held cube on a stiff spring in tension, whose other end is at a body that waits, or that is held."""
+    small, at = (3, 3, 3), (0.06, 0.0, 0.0)
+    cube = mca.Body(name="cube", geometry=mca.Box(size=3 * (SIDE,), divisions=small), material=SOFT)
+    other = replace(cube, name="other", material=replace(SOFT, rho=rho), position=at, rigid=rigid and waits)
+    other = replace(other, velocity=(0.0, -1.0 * waits, 0.0))
+    ends = {"body": "cube", "nodes": "xmax", "other": "other", "other_nodes": "xmin"}
+    fixed = mca.Fixed(body="cube", nodes="xmin"), *([] if waits else [mca.Fixed(body="other", nodes="boundary")])
+    return mca.run(
+        mca.Scene(
+            name="stretched",
+            bodies=(cube, other),
+            fixed=fixed,
+            loads=(mca.Spring(name="s", **ends, stiffness=1e6, length=0.039),),
+            phases=(mca.Settle(duration=0.05),),
+            impact=mca.ImpactPhase(duration=2e-5, output_interval=1e-6),
+        ),
+        precision="float64",
+        threads=1,
+    )
+
+
+@pytest.mark.parametrize(("rigid", "rho"), [(False, 1e3), (False, 10.0), (True, 10.0)])
+def test_a_body_settles_on_a_spring_from_one_that_waits(rigid: bool, rho: float):
+    """However light that is, it stays where it is, as if it were held; then it has its velocity, and the spring's."""
+    waits, held = stretched(True, rigid, rho), stretched(False, rigid, rho)
+    one, other = (result.summary["phases"][0]["energy"] for result in (waits, held))
+    for name in ("elastic", "spring", "damping"):
+        assert one[name] == pytest.approx(other[name], rel=1e-3)
+    assert waits.summary["energy_error"] < 1e-3
+
+
+@pytest.mark.parametrize("damping", [{"loss_factor": 0.2, "band": (100.0, 1e4)}, {"stiffness": 1e-7}, {"mass": 2e4}])
+def test_what_damping_takes_of_a_heated_body_is_right_though_velocities_change(damping: dict[str, Any]):
+    heat = mca.ThermalStrain(body="block", expansion=1e-5, temperature=100.0)
+    loads = heat, mca.Damping(body="block", **damping)
+    ends = mca.Fixed(body="block", nodes="xmin"), mca.Fixed(body="block", nodes="xmax", axes="x")
+    made = scene(bodies=(block(),), contacts=(), fixed=ends, gravity=(0.0, 0.0, 0.0), loads=loads)
+    made = replace(
+        made, impact=mca.ImpactPhase(duration=2e-5, output_interval=1e-6), phases=(mca.Settle(duration=0.1),)
+    )
+    result = mca.run(made, threads=1)
+    assert result.failed == ()
+    assert result.summary["energy_error"] < 1e-4

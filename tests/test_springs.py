@@ -64,6 +64,19 @@ def test_a_rigid_block_on_a_spring_is_a_damped_oscillator(damping: float, precis
     assert abs(result.summary["energy"]["error"]) < 1e-4 * 0.5 * M
 
 
+@pytest.mark.parametrize("times", [10.0, 1e4])
+def test_a_stiff_dashpot_stops_a_rigid_block_after_its_way(times: float):
+    """m v_0 / c, though rows are far apart; the dashpot takes all energy, which is there from the start."""
+    c = times * M * W
+    scene = hung(replace(SPRING, stiffness=0.0, damping=c), bodies=(moving(RIGID, 1.0),))
+    scene = replace(scene, impact=mca.ImpactPhase(duration=200.0 * M / c, output_interval=50.0 * M / c))
+    result = result_of(finished(scene, precision="float64"))
+    way = result["spring_s_m"][0] - result["spring_s_m"][-1]
+    assert way == pytest.approx(M / c, rel=3e-3)
+    energy = result.summary["energy"]
+    assert (energy["initial"], energy["damping"]) == pytest.approx((0.5 * M, 0.5 * M), rel=3e-3)
+
+
 def test_two_masses_swing_against_each_other_and_keep_their_momentum():
     """w^2 = k (1/m + 1/M) of a rigid block and one of three times its mass, between node sets and points."""
     heavy = replace(RIGID, name="b", material=replace(STEEL, rho=3.0 * STEEL.rho), position=(0.04, 0.0, 0.0))
@@ -118,6 +131,20 @@ def test_a_preload_and_a_length_shift_the_swing():
         x = shift * (1.0 - np.cos(W * result.time))
         assert np.abs(start - result["spring_s_m"] - x).max() < 1e-3 * abs(shift)
         assert abs(result.summary["energy"]["error"]) < 1e-3 * 0.5 * K * shift**2
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.2 * M * W])
+def test_a_preload_alone_is_a_constant_force(damping: float):
+    """v = P / c (1 - exp(-c t / m)), or P t / m; the spring gives P times the way."""
+    pull, c = 2.0, damping
+    spring = replace(SPRING, stiffness=0.0, preload=pull, damping=c, direction=(1.0, 0.0, 0.0))
+    result = result_of(finished(hung(spring, periods=0.1), precision="float64"))
+    t = result.time
+    v = pull / c * -np.expm1(-c * t / M) if c else pull * t / M
+    assert np.abs(result["tip_vx"] - v)[1:].max() < 2e-3 * v[-1]
+    way = result["spring_s_m"][0] - result["spring_s_m"]
+    assert result["E_spring"] == pytest.approx(-pull * way, abs=1e-9)
+    assert abs(result.summary["energy"]["error"]) < 1e-3 * 0.5 * M * v[-1] ** 2
 
 
 def test_tables_of_force_and_of_damping_agree_with_an_integration_of_their_own():
@@ -241,7 +268,7 @@ def test_the_summary_lists_springs():
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"stiffness": 0.0}, r"Spring s.stiffness = 0.0: nothing pulls in"),
+        ({"stiffness": 0.0}, r"Spring s.stiffness = 0.0: nothing pulls; give it"),
         ({"stiffness": -1.0}, r"Spring s.stiffness = -1.0: give a number from 0"),
         ({"at": None}, r"Spring s.at = None: give either a point by at="),
         ({"nodes": "xmax"}, r"Spring s.at = \(0.0, 0.0, 0.0\): give either"),
@@ -250,7 +277,7 @@ def test_the_summary_lists_springs():
         ({"other": "b", "other_at": None}, r"Spring s.other_at = None: give either a point by other_at="),
         ({"direction": (0.0, 0.0, 0.0)}, r"Spring s.direction = \(0.0, 0.0, 0.0\): give a direction other than zero"),
         ({"elongations": (0.0, 1.0), "forces": (0.0, 1.0)}, r"Spring s.stiffness = 100.0: leave it out"),
-        ({"stiffness": 0.0, "elongations": (0.0, 1.0), "forces": (0.0,)}, r"Spring s.forces = 'tuple': give two"),
+        ({"stiffness": 0.0, "elongations": (0.0, 1.0), "forces": (0.0,)}, r"Spring s.forces = \(0.0,\): give two"),
         ({"stiffness": 0.0, "elongations": (1.0, 0.0), "forces": (0.0, 1.0)}, r"Spring s.elongations = .*increasing"),
         ({"speeds": (0.0, 1.0), "damping_forces": (0.0, -1.0)}, r"Spring s.damping_forces = .*a dashpot resists"),
     ],

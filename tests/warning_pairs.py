@@ -241,6 +241,28 @@ def _(beyond: bool) -> list[str]:
     return pressed(contacts.driven_into_a_plane, scene, 9.0, depth=1e-6)
 
 
+def arc(turn: float, *, inner: float, outer: float, **more: Any) -> mca.Body:
+    """A part of a ring."""
+    box = mca.Box(size=(outer - inner, turn, 0.002), divisions=(1, 24, 1), origin=(inner, 0.0, 0.0)).build()
+    r, angle, z = box.points.T
+    points = np.column_stack([r * np.cos(angle), r * np.sin(angle), z])
+    return mca.Body(
+        geometry=replace(box, points=points, volume_ratio=np.zeros(0)), material=mca.Elastic(**STEEL), **more
+    )
+
+
+@pair(contacts.frictionless_fit)
+def _(beyond: bool) -> list[str]:
+    turn = (1.25 if beyond else 1.15) * math.pi
+    bodies = arc(turn, name="hub", inner=0.01, outer=0.02), arc(turn, name="ring", inner=0.02, outer=0.03)
+    sides = mca.Surface(body="ring", nodes="xmin"), mca.Surface(body="hub", nodes="xmax")
+    contact = mca.Contact(slave=sides[0], master=sides[1])
+    return told_of(
+        contacts.frictionless_fit,
+        mca.Scene(name="fit", bodies=bodies, contacts=(contact,), impact=mca.ImpactPhase(duration=1e-5)),
+    )
+
+
 @pair(contacts.deep_in_a_thin_body)
 def _(beyond: bool) -> list[str]:
     depth = over(contacts.deep_in_a_thin_body, beyond) * 0.02

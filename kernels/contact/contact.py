@@ -167,8 +167,14 @@ react_kernel(False, 1)  # this variant belongs to the module, so it must exist b
 
 
 @cache
-def plane_kernel(friction: bool, each: bool, may_overlap: bool = False, laws: Laws = PLAIN) -> Any:
-    """Kernel: contact of slave nodes with an analytic plane that may move along itself; as for surfaces."""
+def plane_kernel(
+    friction: bool, each: bool, may_overlap: bool = False, laws: Laws = PLAIN, renewed: bool = False
+) -> Any:
+    """Kernel: contact of slave nodes with an analytic plane that may move along itself; as for surfaces.
+
+    Where the slave's surface is `renewed` in a run, a spring keeps the stiffness with which it began: one that became
+    stiffer while it is pressed would make energy.
+    """
     press = spring_function(friction, laws)
     open_contact = open_function(friction, laws)
     gap_from_rest = rest_function(laws.pressed)
@@ -210,13 +216,18 @@ def plane_kernel(friction: bool, each: bool, may_overlap: bool = False, laws: La
         du = dt * (v[i] - velocity)
         if gap < -of(deepest, k):
             flag_out[k, TOO_DEEP] = 1
+        own = stiffness[s]
+        if wp.static(renewed):
+            if spring.face[s] >= 0:
+                own = spring.stiffness[s]
+            spring.stiffness[s] = own
         if gap < wp.float64(0.0):
-            force, F_n = press(s, gap, normal, du, stiffness[s], stiffness[s], of(mu, k), dt, spring)
+            force, F_n = press(s, gap, normal, du, own, own, of(mu, k), dt, spring)
             add_normal_force(k, F_n, of(per_newton, k), normal_force_out)
             spring.face[s] = 0
             nodal_force_out[i] = nodal_force_out[i] + force
         elif spring.face[s] >= 0:
-            open_contact(s, du, stiffness[s], spring)
+            open_contact(s, du, own, spring)
         if wp.static(friction):  # work of the plane's own motion, trapezoidal as for slip
             half = wp.float64(0.5)
             spring.drive[s] = spring.drive[s] + half * dt * wp.dot(before + spring.tangential[s], velocity)

@@ -25,21 +25,21 @@ class Spring:
     force, normal force and normal force while sticking, summed over the steps since the last row of the history [N].
     depth: largest penetration so far [m]. held: depth in the touched face, or in the last one for a node that slid off
     its side; 0 in front of all faces, ANY_DEPTH before the first step unless clear of them [m]; planes leave it alone.
-    stiffness: of the spring while it is pressed on a face [N/m]; planes leave it alone. lost: energy that it lost as it
-    became softer [J]. rest: depth at which it is free of force [m], only of surfaces, and of planes that bodies may
-    overlap at the start. pressed: see `shrink` [m], and by how much it did so in the last step [m], only where bodies
-    that overlap are pressed apart. normal_energy: the part of `energy` that the normal spring holds [J]. parameters: of
-    the contact law [SI units], shape (spring_count, parameter_count). made: energy that it made so far, see
-    `balance.energy_made` [J]. left: compression with which the side pressed the node last, until it is in front of that
-    side, below it without being pressed, or pressed by another [m]. support, share: the slave's edge that the spring
-    presses in place of its node, or -1, and the node's share of the force [-]; see `edge_rest`. bears: 1 where the side
-    was the last to press the node itself, else 0 [-]. These four are only of masters with several sides. dashpot: force
-    of the law's dashpot in the last step [N], and energy that it dissipated so far [J]; only of laws that have one.
-    limit: of the friction force in the last step [N], and friction_parameters: of the laws of friction [SI units],
-    shape (law_count spring_count, parameter_count), those of spring 0 first; only of contacts with such laws. bond: 1
-    while a bond holds the node to its place on `face`, -1 once it has failed, else 0 [-]. bond_time: how long it has
-    held [s]. bond_limit: forces in tension and in shear at which it fails [N]. These three are only of contacts with
-    bonds.
+    stiffness: of the spring while it is pressed on a face [N/m]; planes leave it alone, but where elements fail. lost:
+    energy that it lost as it became softer [J]. rest: depth at which it is free of force [m], only of surfaces, and of
+    planes that bodies may overlap at the start, or whose slaves may fail. pressed: see `shrink` [m], and by how much it
+    did so in the last step [m], only where bodies that overlap are pressed apart. normal_energy: the part of `energy`
+    that the normal spring holds [J]. parameters: of the contact law [SI units], shape (spring_count, parameter_count).
+    made: energy that it made so far, see `balance.energy_made` [J]. left: compression with which the side pressed the
+    node last, until it is in front of that side, below it without being pressed, or pressed by another [m]. support,
+    share: the slave's edge that the spring presses in place of its node, or -1, and the node's share of the force [-];
+    see `edge_rest`. bears: 1 where the side was the last to press the node itself, else 0 [-]. These four are only of
+    masters with several sides. dashpot: force of the law's dashpot in the last step [N], and energy that it dissipated
+    so far [J]; only of laws that have one. limit: of the friction force in the last step [N], and friction_parameters:
+    of the laws of friction [SI units], shape (law_count spring_count, parameter_count), those of spring 0 first; only
+    of contacts with such laws. bond: 1 while a bond holds the node to its place on `face`, -1 once it has failed, else
+    0 [-]. bond_time: how long it has held [s]. bond_limit: forces in tension and in shear at which it fails [N]. These
+    three are only of contacts with bonds.
     """
 
     tangential: wp.array(dtype=wp.vec3d)

@@ -19,7 +19,8 @@ from warp_mca.kernels.records.extremes import keep_functions
 
 wp.set_module_options({"enable_backward": False})
 
-OWN, MEAN, NODAL = "own", "mean", "nodal"
+OWN, MEAN, NODAL, SPLIT = "own", "mean", "nodal", "split"
+OWN_SHARE = 25.0  # greatest K / G that points of a SPLIT pressure have to themselves: nu = 0.4803
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,8 @@ class Formulation:
         name: of the element.
         corners, points: numbers of its nodes and of its integration points.
         pressure: from which change of volume it comes: OWN of each point, MEAN of the element, NODAL of the pressure
-            nodes of each corner, which `ElementStage.nodal` gives.
+            nodes of each corner, which `ElementStage.nodal` gives; SPLIT, OWN with the K of `modulus_functions` and
+            MEAN with the rest.
         struct: what the functions below need of an element.
         load: (X, u, conn, e) -> struct.
         gradient: (struct, g) -> (volume of point g [m^3], displacement gradient there in the element's frame).
@@ -64,6 +66,27 @@ class Formulation:
 
 
 Maker = Callable[[str, str, bool], Formulation]  # of a precision, a law, and whether strains may be large
+
+
+@cache
+def modulus_functions(precision: str, splits: bool) -> tuple[Any, Any]:
+    """Functions (K, G) -> bulk modulus of a point's own change of volume, and of the mean one [Pa]; all of K, each,
+    where the pressure is not split."""
+    R = scalars(precision).real
+
+    @wp.func
+    def own_modulus(K: R, G: R):
+        if wp.static(splits):
+            return wp.min(K, R(OWN_SHARE) * G)
+        return K
+
+    @wp.func
+    def mean_modulus(K: R, G: R):
+        if wp.static(splits):
+            return K - wp.min(K, R(OWN_SHARE) * G)
+        return K
+
+    return own_modulus, mean_modulus
 
 
 @wp.func

@@ -11,7 +11,7 @@ import warp as wp
 
 from warp_mca.kernels.elements import hex8i_points, hex8i_vectors
 from warp_mca.kernels.elements.failure import failure_kernel
-from warp_mca.kernels.elements.formulation import OWN, Formulation
+from warp_mca.kernels.elements.formulation import OWN, SPLIT, Formulation, modulus_functions
 from warp_mca.kernels.elements.hex8i_small import elastic_function, plastic_tractions_function, stress_function
 from warp_mca.kernels.elements.hexahedron import load_function, store_function
 from warp_mca.kernels.elements.internal_modes import mode_functions, place_functions
@@ -116,6 +116,8 @@ def formulation(points: int, precision: str, law_name: str, finite: bool) -> For
     by_points, plastic = keeps_vectors(law_functions(law_name, precision), finite), bool(law_name)
     read_vectors, _ = hex8i_vectors.vector_functions(precision, law_name, points)
     plastic_tractions = plastic_tractions_function(precision, law_name, points)
+    splits = hex8i_points.splits(precision, law_name, finite)
+    own_modulus, _ = modulus_functions(precision, splits)
 
     @wp.struct
     class Hex8i:
@@ -156,8 +158,8 @@ def formulation(points: int, precision: str, law_name: str, finite: bool) -> For
     @wp.func
     def enriched(shape: Hex8i, e: int, m: int, flag: int, law: wp.array2d(dtype=R), history: wp.array2d(dtype=R)):
         y = frame(shape.x)
-        K = law[m, 0]
         G = law[m, 1]
+        K = own_modulus(law[m, 0], G)
         c = mat33()
         share = R(1.0)
         if wp.static(by_points):
@@ -193,7 +195,7 @@ def formulation(points: int, precision: str, law_name: str, finite: bool) -> For
         column = g // wp.static(layer_count)
         return (column ^ (column >> 1)) + 4 * ((g % wp.static(layer_count)) // wp.static(layer_count // 2))
 
-    given = (OWN, Hex8i, load_shape, gradient, rotation, 1, corner_of)
+    given = (SPLIT if splits else OWN, Hex8i, load_shape, gradient, rotation, 1, corner_of)
     lag = lags(law_functions(law_name, precision), finite)
     return Formulation("hex8i", 8, points, *given, enriched=enriched, lags=lag)
 

@@ -5,7 +5,16 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.elements.formulation import MEAN, NODAL, OWN, Maker, load_function, parts_of
+from warp_mca.kernels.elements.formulation import (
+    MEAN,
+    NODAL,
+    OWN,
+    SPLIT,
+    Maker,
+    load_function,
+    modulus_functions,
+    parts_of,
+)
 from warp_mca.kernels.elements.viscosity import THERMAL
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.materials.isochoric import law_kinematics
@@ -29,13 +38,13 @@ def shared_function(maker: Maker, precision: str, law_name: str, finite: bool, h
     """The function (struct, e, K, swelling, group, dilatation) -> what points share.
 
     (J - 1 and pressure [Pa] of the mean; pressure and its energy [J] of pressure nodes; 0 where there is none.) The
-    energy is that of the volume strain less `swelling` where elements are `heated`.
+    energy is that of the volume strain less `swelling` where elements are `heated`. K is what goes with the mean.
     """
     form, _, _ = parts_of(maker, precision, law_name, finite)
     struct, gradient, points, corners = form.struct, form.gradient, form.points, form.corners
     k, R = kinematics(precision, finite), scalars(precision).real
     dilatation_of, pressure_of, volumetric_energy = k.dilatation, k.pressure, k.volumetric_energy
-    mean, nodal, share = form.pressure == MEAN, form.pressure == NODAL, 1.0 / corners
+    mean, nodal, share = form.pressure in (MEAN, SPLIT), form.pressure == NODAL, 1.0 / corners
     _, elastic_dilatation = swelling_functions(precision, finite, heated)
 
     @wp.func
@@ -121,11 +130,13 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
     form, point, place = parts_of(maker, precision, law_name, finite)
     load = load_function(maker, precision, law_name, finite)
     gradient, rotation, modes, points = form.gradient, form.rotation, form.modes, form.points
-    shared, own = shared_function(maker, precision, law_name, finite, heated), form.pressure == OWN
+    shared, own = shared_function(maker, precision, law_name, finite, heated), form.pressure in (OWN, SPLIT)
+    own_modulus, mean_modulus = modulus_functions(precision, form.pressure == SPLIT)
     swelling_of, elastic_dilatation = swelling_functions(precision, finite, heated)
     plastic, general, read = bool(law_name), point.general, point.read
     has_modes, lags = form.modes is not None, form.lags
-    late = form.pressure == MEAN and not general  # one pass over the points: a second would not fit side by side
+    # one pass over the points: a second would not fit side by side
+    late = form.pressure in (MEAN, SPLIT) and not general
     k, R = law_kinematics(precision, law_name, finite), scalars(precision).real
     dilatation_of, deviator, volumetric_energy = k.dilatation, k.deviator, k.volumetric_energy
     keep_peaks = peaks_function(precision, law_name, finite, points)
@@ -173,12 +184,12 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
             S, _pressure, p, stored, spent = read(strain, theta, G, place(g), e, m, flag, law, history)
             keep_peaks(e, g, H, S, N, d, p, peak_out)
             if wp.static(own and not general):
-                stored += volumetric_energy(K, elastic_dilatation(theta, swelling))
+                stored += volumetric_energy(own_modulus(K, G), elastic_dilatation(theta, swelling))
             elastic += weight * stored
             dissipated += weight * spent
             smallest = wp.min(smallest, wp.determinant(identity + H))
         if wp.static(late):
-            elastic += volume * volumetric_energy(K, elastic_dilatation(growth / volume, swelling))
+            elastic += volume * volumetric_energy(mean_modulus(K, G), elastic_dilatation(growth / volume, swelling))
         energy_out[0, first + e] = elastic
         energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * largest)
         smallest = smallest * wp.determinant(identity + rotation(shape))
@@ -205,7 +216,8 @@ def stress_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
     load = load_function(maker, precision, law_name, finite)
     gradient, rotation, corner_of = form.gradient, form.rotation, form.corner_of
     points, corners, shown = form.points, form.corners, form.shown
-    shared, own = shared_function(maker, precision, law_name, finite), form.pressure == OWN
+    shared, own = shared_function(maker, precision, law_name, finite), form.pressure in (OWN, SPLIT)
+    own_modulus, mean_modulus = modulus_functions(precision, form.pressure == SPLIT)
     plastic, general, read = bool(law_name), point.general, point.read
     k, R = law_kinematics(precision, law_name, finite), scalars(precision).real
     dilatation_of, deviator, pressure_of, cauchy = k.dilatation, k.deviator, k.pressure, k.cauchy
@@ -234,16 +246,17 @@ def stress_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
             flag = yielded[e]
         shape = load(X, u, conn, e, m, flag, law, history)
         Q = wp.identity(n=3, dtype=R) + rotation(shape)
-        theta, mean_pressure, _energy = shared(shape, e, K, R(0.0), group, dilatation)
+        theta, mean_pressure, _energy = shared(shape, e, mean_modulus(K, law[m, 1]), R(0.0), group, dilatation)
         for g in range(wp.static(points)):
             _weight, H = gradient(shape, g)
             strain, N, d = deviator(H)
             if wp.static(own):
                 theta = dilatation_of(H)
-                mean_pressure = pressure_of(K, theta)
             S, pressure, p, _stored, _spent = read(strain, theta, law[m, 1], place(g), e, m, flag, law, history)
             if wp.static(not general):
                 pressure = mean_pressure
+                if wp.static(own):
+                    pressure = mean_pressure + pressure_of(own_modulus(K, law[m, 1]), theta)
             local = cauchy(H, S, N, d, pressure)
             sigma = Q * local * wp.transpose(Q)
             for j in range(wp.static(shown)):

@@ -1,7 +1,7 @@
 """Owns the damage of Johnson and Cook, Eng. Fract. Mech. 21 (1985) 31: D = sum of dp / eps_f.
 
 eps_f = (D1 + D2 exp(D3 eta)) (1 + D4 ln(rate / rate_0)) (1 + D5 T*), with the mean stress over the von Mises stress,
-eta, 1.5 at most. A strain at failure below LEAST counts as this.
+eta, 1.5 at most. A strain at failure below the seventh parameter counts as this.
 """
 
 from functools import cache
@@ -14,9 +14,8 @@ from warp_mca.kernels.hardware.scalars import scalars
 
 wp.set_module_options({"enable_backward": False})
 
-PARAMETERS = 6
+PARAMETERS = 7
 HIGHEST = 1.5  # triaxiality [-]
-LEAST = 1e-6  # strain at failure [-]
 
 
 @cache
@@ -37,7 +36,7 @@ def damage(precision: str) -> Any:
             strain = c[0] + c[1] * wp.exp(c[2] * eta)
             strain *= R(1.0) + c[3] * wp.log(wp.max(point.rate / c[5], R(1.0)))
             strain *= R(1.0) + c[4] * point.temperature
-            found = D + wp.float64(point.dp / (point.scale * wp.max(strain, R(LEAST))))
+            found = D + wp.float64(point.dp / (point.scale * wp.max(strain, c[6])))
         return found
 
     return johnson_cook_damage

@@ -10,7 +10,7 @@ and m that of their masses. The rail gives no impulse along e, so that momentum 
 
 import warp as wp
 
-from warp_mca.kernels.nodes.constraint import table_value
+from warp_mca.kernels.nodes.constraint import table_mean
 from warp_mca.kernels.records.extremes import keep_speed
 from warp_mca.kernels.records.half_steps import add_half_steps
 
@@ -42,10 +42,12 @@ class Bases:
 
 
 @wp.func
-def base_velocity(bases: Bases, k: int, t: wp.float64) -> wp.vec3d:
-    """b(t) of base k [m/s]."""
-    x = table_value(bases.times, bases.v_x, bases.table[k], bases.table[k + 1], t)
-    y = table_value(bases.times, bases.v_y, bases.table[k], bases.table[k + 1], t)
+def base_velocity(bases: Bases, k: int, n: int, dt: wp.float64) -> wp.vec3d:
+    """Mean of b of base k over step n [m/s]."""
+    start = wp.float64(n) * dt
+    end = wp.float64(n + 1) * dt
+    x = table_mean(bases.times, bases.v_x, bases.table[k], bases.table[k + 1], start, end)
+    y = table_mean(bases.times, bases.v_y, bases.table[k], bases.table[k + 1], start, end)
     return wp.vec3d(x, y, wp.float64(0.0))
 
 
@@ -75,8 +77,8 @@ def move_bases(
     """
     k = wp.tid()
     e = bases.direction[k]
-    t = (wp.float64(clock_out[k]) + wp.float64(0.5)) * dt
-    clock_out[k] = clock_out[k] + 1
+    n = clock_out[k]
+    clock_out[k] = n + 1
     v_carriage = carriage_out[k]
     free = v_carriage + dt * bases.gravity[k]
     momentum = bases.mass[k] * free
@@ -90,10 +92,10 @@ def move_bases(
         momentum -= latest[bases.coupling[k]]
     if total > wp.float64(0.0):
         share = wp.dot(e, momentum) / total
-    b = base_velocity(bases, k, t)
+    b = base_velocity(bases, k, n, dt)
     across = b - wp.dot(e, b) * e
     v = across + share * e
-    b = base_velocity(bases, k, t - dt)
+    b = base_velocity(bases, k, n - 1, dt)
     across_before = b - wp.dot(e, b) * e
     impulse = total * v - momentum
     half = wp.float64(0.5)

@@ -65,6 +65,31 @@ def table_value(times: wp.array(dtype=wp.float64), values: wp.array(dtype=wp.flo
 
 
 @wp.func
+def table_mean(
+    times: wp.array(dtype=wp.float64),
+    values: wp.array(dtype=wp.float64),
+    a: int,
+    b: int,
+    start: wp.float64,
+    end: wp.float64,
+):
+    """Mean of `table_value` from `start` to `end`: a velocity by which a step moves as far as the table says."""
+    half = wp.float64(0.5)
+    latest = start
+    value = table_value(times, values, a, b, start)
+    way = wp.float64(0.0)
+    for k in range(a, b):
+        if times[k] > latest and times[k] < end:
+            way += half * (times[k] - latest) * (value + values[k])
+            latest = times[k]
+            value = values[k]
+    last = table_value(times, values, a, b, end)
+    if latest == start:  # straight over the step
+        return half * (value + last)
+    return (way + half * (end - latest) * (value + last)) / (end - start)
+
+
+@wp.func
 def drive(
     k: int,
     m: wp.float64,
@@ -75,14 +100,17 @@ def drive(
     work_after_out: wp.array(dtype=wp.vec3d),
     clock_out: wp.array(dtype=wp.int32),
 ):
-    """v(n+1/2) of a node whose driven axes follow tables at its own time; sums the work of the drive.
+    """v(n+1/2) of a node whose driven axes follow tables at its own time, their mean; sums the work of the drive.
 
     The reaction at t(n) works over v(n-1/2) dt / 2 before t(n), which completes work_out [J] at t(n), and over
     v(n+1/2) dt / 2 after it, which work_after_out [J] holds for the next step. Each node counts its own steps in
     clock_out, so that no thread waits for a common clock.
     """
-    t = (wp.float64(clock_out[k]) + wp.float64(0.5)) * dt
-    clock_out[k] = clock_out[k] + 1
+    n = clock_out[k]
+    t = wp.float64(n) * dt
+    t_before = wp.float64(n - 1) * dt
+    t_after = wp.float64(n + 1) * dt
+    clock_out[k] = n + 1
     begin = bonds.begin[k]
     end = bonds.end[k]
     v = free
@@ -90,8 +118,8 @@ def drive(
     work_after = wp.vec3d()
     for c in range(3):
         if begin[c] >= 0:
-            target = table_value(bonds.times, bonds.values, begin[c], end[c], t)
-            before = table_value(bonds.times, bonds.values, begin[c], end[c], t - dt)
+            target = table_mean(bonds.times, bonds.values, begin[c], end[c], t, t_after)
+            before = table_mean(bonds.times, bonds.values, begin[c], end[c], t_before, t)
             half_impulse = wp.float64(0.5) * m * (target - free[c])
             v[c] = target
             work[c] = half_impulse * before

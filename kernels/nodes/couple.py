@@ -39,7 +39,7 @@ def ground_motion(
         k = clusters.base[j]
         if k >= 0:
             e = bases.direction[k]
-            b = base_velocity(bases, k, (wp.float64(clock[k]) + wp.float64(0.5)) * dt)
+            b = base_velocity(bases, k, clock[k], dt)
             free = carriage[k] + dt * bases.gravity[k]
             found.velocity = b + wp.dot(e, free - b) * e
             if bases.mass[k] > wp.float64(0.0):

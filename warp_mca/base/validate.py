@@ -198,8 +198,9 @@ def kind_of(field: str, value: object, kind: type | tuple[type, ...], remedy: st
 
 
 def brief(value: object) -> object:
-    """The value for a message, or the name of its class where it may be long."""
-    return value if value is None or isinstance(value, str | Real) else type(value).__name__
+    """The value for a message, or the name of its class where it may be long; `bad_value` shortens sequences."""
+    entries = value if isinstance(value, tuple | list) else (value,)
+    return value if all(entry is None or isinstance(entry, str | Real) for entry in entries) else type(value).__name__
 
 
 def call(field: str, value: object, what: str, function: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:

@@ -54,10 +54,10 @@ def join_models(models: Sequence[Model]) -> Model:
     check_alike(models)
     if any(model.fails and model.passes for model in models):
         remedy = "contact follows it in single runs alone; use run in place of run_batch"
-        raise bad_value("failure of materials", "given", remedy)
+        raise bad_value("failure of materials of scenes", _failing(models), remedy)
     if len({model.fails for model in models}) > 1:
-        which = f"scenes[{[model.fails for model in models].index(True)}]"
-        raise bad_value(f"failure of materials of {which}", "given", "others have none; run these in batches apart")
+        remedy = "others have none; run these in batches apart"
+        raise bad_value("failure of materials of scenes", _failing(models), remedy)
     starts = {kind: offsets([count(model) for model in models]) for kind, count in _COUNTS.items()}
     nodes, elements = starts["nodes"], starts["elements"]
     blocks, order, ranges = _blocks(models, nodes, elements)
@@ -76,6 +76,11 @@ def join_models(models: Sequence[Model]) -> Model:
         rigid_blocks=(),  # nothing shows the bodies of a batch
         batch=Layout(nodes=nodes, joints=offsets([len(model.joints) for model in models]), elements=ranges),
     )
+
+
+def _failing(models: Sequence[Model]) -> list[int]:
+    """Numbers of the scenes whose elements may fail."""
+    return [k for k, model in enumerate(models) if model.fails]
 
 
 def with_alike_passes(models: Sequence[Model]) -> list[Model]:

@@ -76,7 +76,7 @@ def _check(scene: Scene) -> None:
     for load in scene.loads:
         if load.counts_from_impact:
             remedy = f"its times count from the touch, which {METHOD} does not know; leave the load out"
-            raise bad_value(f"{load.title}.amplitude", "given", remedy)
+            raise bad_value(f"{load.title}.amplitude", getattr(load, "amplitude", None), remedy)
 
 
 def _result(course: Course, swing: FlexibleSwing) -> Result:

@@ -26,12 +26,15 @@ from warp_mca.scene import DampedPenalty, Settle
 if TYPE_CHECKING:
     from warp_mca.phases.impact import Impact
     from warp_mca.phases.scene_run import SceneRun
+    from warp_mca.step.solver import Solver
     from warp_mca.system.state import State
 
 Array = NDArray[np.float64]
 STEPS = 10  # between two looks at the kinetic energy at most
 LOOKS = 8  # at least until it is at its greatest
 ROWS = 500  # of the history, where it lasts as long as it may
+ALL_AXES = 7  # at rest, in the role of a node
+HEAVY = 1e60  # mass [kg] and inertia [kg m^2] of rigid bodies that nothing moves
 
 
 def settle(phase: Settle, impact: Impact, tell: Callable[[float], None]) -> Stretch:
@@ -77,6 +80,31 @@ def settle(phase: Settle, impact: Impact, tell: Callable[[float], None]) -> Stre
     return stretch
 
 
+class Held:
+    """Bodies that nothing accelerates until they are released: other bodies settle on what hangs from them, too."""
+
+    def __init__(self, solver: Solver, nodes: NDArray[np.bool_], bodies: NDArray[np.bool_]) -> None:
+        """Hold nodes of flexible bodies, and rigid bodies."""
+        role, self.before = solver.constraints.role, []
+        if nodes.any() and len(role):
+            self._put(role, np.where(nodes, role.numpy() | ALL_AXES, role.numpy()))
+        if bodies.any():
+            own, held = solver.rigid.bodies, bodies[:, None, None]
+            self._put(own.mass, np.where(bodies, HEAVY, own.mass.numpy()))
+            self._put(own.inertia, np.where(held, HEAVY * np.eye(3), own.inertia.numpy()))
+            self._put(own.inverse_inertia, np.where(held, np.eye(3) / HEAVY, own.inverse_inertia.numpy()))
+            self._put(own.gravity, np.where(bodies[:, None], 0.0, own.gravity.numpy()))
+
+    def _put(self, array: wp.array, values: NDArray) -> None:
+        self.before.append((array, array.numpy().copy()))
+        array.assign(values)
+
+    def release(self) -> None:
+        """Let all move as before."""
+        for array, values in self.before:
+            array.assign(values)
+
+
 class HalfSteps:
     """Velocities of nodes and momenta of rigid bodies at half steps, and how a state gets others.
 
@@ -106,6 +134,8 @@ class HalfSteps:
         self.dashpots = [(item.parameters, np.array(item.parameters.numpy())) for item in damped]
         for parameters, _ in self.dashpots:
             parameters.zero_()
+        self.held = Held(self.solver, waiting, bodies)
+        self.now = self._half_steps()
 
     def look(self) -> float:
         """Kinetic energy of the bodies that settle, the mean of those half a step before and after [J].
@@ -146,6 +176,7 @@ class HalfSteps:
         """Let bodies that waited have their velocities, in a state whose rows begin anew."""
         for parameters, values in self.dashpots:
             parameters.assign(values)
+        self.held.release()
         kept, state = scene_run.ledger.kept, self.state
         self.look()
         (before, *_), (after, *_) = self.now
@@ -184,8 +215,8 @@ class HalfSteps:
         self.kept.damping += lost - self._kinetic(given[0], given[0] + 2.0 * half[0], changed)
         way = self.impact.steps.dt * (before[0] - given[0])
         self.kept.damping += self._unfelt(way)
-        for kind in self.solver.model.loads:
-            getattr(self.solver, kind).feel(self.state, way)
+        for kind in self.solver.model.loads if self.state.steps else ():  # no step has moved anything before
+            getattr(self.solver, kind).feel(self.state, self.trial, way)
 
     def _unfelt(self, way: Array) -> float:
         """Work of friction over the way that a change of velocity hides from springs along surfaces [J].

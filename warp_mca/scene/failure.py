@@ -104,6 +104,8 @@ class JohnsonCookFailure(StrainFailure):
     Attributes:
         D1, D2, D3, D4, D5: of the strain at failure [-]; D3 is negative where tension is worse than compression.
         rate_0: rate of the equivalent plastic strain at which they were measured [1/s].
+        least_strain: strain at failure where the expression gives less, or less than 0 [-]: EFMIN of LS-DYNA, of the
+            same default, by which such points fail at their first flow.
     """
 
     D1: float
@@ -112,6 +114,7 @@ class JohnsonCookFailure(StrainFailure):
     D4: float = 0.0
     D5: float = 0.0
     rate_0: float = 1.0
+    least_strain: float = 1e-6
     law = "warp_mca.kernels.failure.johnson_cook"
 
     def __post_init__(self) -> None:
@@ -119,14 +122,14 @@ class JohnsonCookFailure(StrainFailure):
         for name in ("D1", "D2", "D3", "D4", "D5"):
             if not validate.is_number(getattr(self, name)):
                 raise bad_value(f"JohnsonCookFailure.{name}", getattr(self, name), "give a finite number")
-        validate.positive("JohnsonCookFailure", rate_0=self.rate_0)
+        validate.positive("JohnsonCookFailure", rate_0=self.rate_0, least_strain=self.least_strain)
         if not self.D1 + self.D2 > 0.0:
             raise bad_value("JohnsonCookFailure.D1", self.D1, "D1 + D2, the strain at failure in shear, is above 0")
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """D1 to D5 [-] and rate_0 [1/s]."""
-        return self.D1, self.D2, self.D3, self.D4, self.D5, self.rate_0
+        """D1 to D5 [-], rate_0 [1/s] and the least strain at failure [-]."""
+        return self.D1, self.D2, self.D3, self.D4, self.D5, self.rate_0, self.least_strain
 
 
 @dataclass(frozen=True, kw_only=True)

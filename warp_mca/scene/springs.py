@@ -35,7 +35,7 @@ class Spring(Load):
         damping: slope of T_d [N s/m].
         speeds, damping_forces: T_d as a table in place of damping, speeds of elongation [m/s] and tensions [N].
         length: at which T_s is taken at 0 [m]; None is L at the start of the impact phase.
-        preload: tension beside T_s [N]; below 0 it pushes.
+        preload: tension beside T_s [N]; below 0 it pushes. Alone it is a constant force.
         direction: along which L is measured and T acts, fixed in space [-]; None is the line between the points.
     """
 
@@ -76,11 +76,8 @@ class Spring(Load):
         for number, x, y in (("stiffness", "elongations", "forces"), ("damping", "speeds", "damping_forces")):
             if getattr(self, x) != () or getattr(self, y) != ():
                 self._check_table(number, x, y)
-        if not (any(self.table) or any(self.damper)):
-            remedy = "nothing pulls in proportion; give stiffness, damping, or a table"
-            raise bad_value(f"{self.title}.stiffness", self.stiffness, remedy)
-        if self.preload and not any(self.table):
-            raise bad_value(f"{self.title}.preload", self.preload, "give stiffness or forces; a dashpot holds none")
+        if not (any(self.table) or any(self.damper) or self.preload):
+            raise bad_value(f"{self.title}.stiffness", self.stiffness, "nothing pulls; give it, damping, or preload")
 
     def _check_points(self) -> None:
         if self.other is not None:

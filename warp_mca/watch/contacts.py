@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from warp_mca.physics.contact.sides import face_geometry
 from warp_mca.physics.contact.surfaces import is_curved_contact
 from warp_mca.scene import RigidPlane
-from warp_mca.watch.row import Array, Finished, Values, listed_passes, row
+from warp_mca.watch.row import Array, Context, Finished, Kind, Values, When, listed_passes, row
 
 if TYPE_CHECKING:
     from warp_mca.system.contact import ContactPass
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 PATCH = 6.0  # nodes that carry a Hertzian contact three cells across: 8 / 9 of pi / 4 times 3 squared
 POINT = 2.5  # nodes that carry a flat contact at least; fewer are a corner, or an edge of one cell
+FLUSH = 0.2  # distance of surfaces that lie on each other, over the width of a face, at most
 BOUND = 0.1  # component of a normal along an axis from which on a node that is bound there cannot follow the normal
 
 
@@ -95,6 +96,33 @@ def undented_master(c: Finished, least: float) -> Iterator[Values]:
         patch, width = _pressed(c.model, item, c.ledger.nodes_at_peak(k), c.depths[k])
         if patch < least * width**2:
             yield dict(slave=contact.slave.body, patch=math.sqrt(patch), master=contact.master.body, width=width)
+
+
+@row(
+    "{slave} lies around or in {master} without friction: only their facets keep them from turning against each other, "
+    "and the fit is lost where they turn by half a facet;",
+    "give the contact mu, or hold both bodies against turning",
+    0.5,
+    "of the size of the normals is left in their mean at most, where one body surrounds the other",
+    kind=Kind.ADVICE,
+    when=When.BEFORE,
+)
+def frictionless_fit(c: Context, most: float) -> Iterator[Values]:
+    """Size of the mean of unit normals where curved surfaces of a contact without friction lie on each other."""
+    from scipy.spatial import KDTree
+
+    for _, item, contact in listed_passes(c.scene, c.model):
+        if isinstance(contact.master, RigidPlane) or not item.leads or item.mu > 0.0 or item.friction or item.bonds:
+            continue
+        if not is_curved_contact(c.model.X, item):
+            continue
+        area, normal = face_geometry(c.model.X, item.face)
+        middle, X = c.model.X[item.face].mean(axis=1), c.model.X[item.slave]
+        face = np.asarray(KDTree(middle).query(X)[1])
+        unit = normal[face] / area[face, None]
+        close = np.abs(((X - middle[face]) * unit).sum(axis=1)) < FLUSH * np.sqrt(area[face])
+        if close.mean() > 0.5 and np.linalg.norm(unit[close].mean(axis=0)) < most:
+            yield dict(slave=contact.slave.body, master=contact.master.body)
 
 
 def _few_nodes(c: Finished, k: int, patch: float) -> float:

@@ -49,7 +49,7 @@ def scattered_pressure(c: Context, most: float) -> Iterator[Values]:
 )
 def enriched_rubber(c: Context, most: float) -> Iterator[Values]:
     """Poisson's ratio of rubber in bodies of hexahedra with internal modes, or of `tet10_mean`."""
-    stiff, soft = "is some percent too stiff, and loses energy near nu = 0.5,", "is too soft, and may become unstable,"
+    stiff, soft = "is some percent too stiff,", "is too soft, and may become unstable,"
     known = {**dict.fromkeys(("hex8i", "hex8w", "hex8w3"), stiff), "tet10_mean": soft}
     for body in c.scene.bodies:
         materials = [material for material, _ in body_materials(body, c.meshes[body.name]) if material.finite_only]

@@ -42,13 +42,20 @@ def as_settled(
 
 
 def passes_of(
-    parts: Bodies, contact: Contact, index: int, slave: Faces, master: Faces | None, place: Place | None = None
+    parts: Bodies,
+    contact: Contact,
+    index: int,
+    slave: Faces,
+    master: Faces | None,
+    place: Place | None = None,
+    flat: bool | None = None,
 ) -> list[Given]:
     """The passes of a contact as `as_settled` gives it: of nodes, one or two, then of edges where some may cross.
 
-    Where elements of its bodies may fail there is one of edges always: some may cross later. `place` is that of bonds.
+    Where elements of its bodies may fail there is one of edges always: some may cross later. `place` is that of bonds,
+    `flat` as in `spring_stiffness`.
     """
-    found = contact_passes(contact, index, slave, master)
+    found = contact_passes(contact, index, slave, master, flat)
     if place is not None:
         found = [bonded(found[0], contact, place, parts.node_start[contact.slave.body], slave, parts.X)]
     given = []

@@ -34,7 +34,7 @@ def new_springs(count: int, sided: int, stage: ContactStage) -> Any:
     found.dashpot = wp.zeros(0 if law_functions(stage.laws.normal).dashpot is None else count, dtype=wp.vec2d)
     found.parameters, found.friction_parameters = stage.parameters, stage.friction_parameters
     found.limit = wp.zeros(count if stage.laws.friction else 0, dtype=wp.float64)
-    found.rest = wp.zeros(count if stage.overlaps != {"refuse"} or not stage.on_plane else sided, dtype=wp.float64)
+    found.rest = wp.zeros(count if stage.may_rest else sided, dtype=wp.float64)
     found.pressed = wp.zeros(count if stage.laws.pressed else 0, dtype=wp.vec2d)
     found.left = wp.zeros(sided, dtype=wp.float64)
     found.share = wp.full(sided, 1.0, dtype=wp.float64)

@@ -52,7 +52,7 @@ class ContactStage:
         self._begin(items, model, index, normal_force)
         friction = any(item.mu > 0.0 for item in items)
         if items[0].plane is not None:
-            self.kernel = contact.plane_kernel(friction, self.each, self.overlaps != {"refuse"}, self.laws)
+            self.kernel = contact.plane_kernel(friction, self.each, self.may_rest, self.laws, model.fails)
             self._make_planes()
             return
         slots = SLOTS if self.general and self.sides > 1 else 1
@@ -84,6 +84,7 @@ class ContactStage:
         self.slave = wp.array(self._join("slave"), dtype=wp.int32)
         self.stiffness = wp.array(self._join("stiffness"), dtype=wp.float64)
         self.mu, self.overlaps = numbers([item.mu for item in items]), {item.initial_overlap for item in items}
+        self.may_rest = items[0].plane is None or self.overlaps != {"refuse"} or model.fails
         bonded, pressed = any(item.bonds is not None for item in items), "press" in self.overlaps
         self.laws = Laws(items[0].law, items[0].friction, bonded, pressed)
         check_dashpots(items)
@@ -121,8 +122,7 @@ class ContactStage:
 
     def _make_planes(self) -> None:
         planes = [item.plane for item in self.items if item.plane is not None]
-        normals = [np.asarray(plane.normal, dtype=float) for plane in planes]
-        unit = [normal / np.linalg.norm(normal) for normal in normals]
+        unit = [n / np.linalg.norm(n) for n in (np.asarray(plane.normal, dtype=float) for plane in planes)]
         self.planes = [vectors([p.point for p in planes]), vectors(unit), vectors([p.velocity for p in planes])]
         self.deepest = numbers([item.deepest for item in self.items])
 

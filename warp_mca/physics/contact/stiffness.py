@@ -47,20 +47,28 @@ def nearest_faces(contact: Contact, slave: Faces, master: Faces | None) -> tuple
     return nearest, int(face[nearest])
 
 
-def spring_stiffness(contact: Contact, slave: Faces, master: Faces | None) -> list[tuple[Array, Array]]:
+def is_flat(slave: Faces, master: Faces | None) -> bool:
+    """Whether no surface of a contact is curved, which decides on the default stiffness."""
+    surfaces = [slave] if master is None else [slave, master]
+    return not any(is_curved(faces.node, faces.normal) for faces in surfaces)
+
+
+def spring_stiffness(
+    contact: Contact, slave: Faces, master: Faces | None, flat: bool | None = None
+) -> list[tuple[Array, Array]]:
     """Penalty stiffness [N/m] of the nodes and of the faces of the slave, and of the master where it has faces.
 
     A number f gives f K A^2 / V, and a node the mean of the faces around it. The default takes E* in place of K, so
     that it suits any Poisson's ratio, and is stiffer where one of the surfaces is curved. Where both are flat, nodes
     share the stiffness of faces as they share their area, so that their pressure is uniform, and the springs of the
-    two surfaces are in series. Two passes of one contact have half of it each. `stiffness` is that
-    of each node.
+    two surfaces are in series. Two passes of one contact have half of it each. `flat` is what `is_flat` says; of
+    surfaces that change, what it said at the start. `Contact.stiffness` is that of each node.
     """
     surfaces = [slave] if master is None else [slave, master]
     if (k := contact.stiffness) is not None:
         return [(np.full(len(faces.nodes), k), np.full(len(faces.node), k)) for faces in surfaces]
     half = 0.5 if contact.two_way else 1.0
-    if contact.penalty is None and not any(is_curved(faces.node, faces.normal) for faces in surfaces):
+    if contact.penalty is None and (is_flat(slave, master) if flat is None else flat):
         near = nearest_faces(contact, slave, master)[: len(surfaces)]
         layers = [float(faces.layer[k] / faces.area[k]) for faces, k in zip(surfaces, near, strict=True)]
         found = []

@@ -117,13 +117,16 @@ def is_curved_contact(X: Array, item: ContactPass) -> bool:
     return any(is_curved(face, face_geometry(X, face)[1]) for face in (item.slave_face, item.face) if len(face))
 
 
-def contact_passes(contact: Contact, index: int, slave: Faces, master: Faces | None) -> list[ContactPass]:
+def contact_passes(
+    contact: Contact, index: int, slave: Faces, master: Faces | None, flat: bool | None = None
+) -> list[ContactPass]:
     """One pass, or two when the contact is two-way: then each carries half the stiffness.
 
     The spring of a slave node has the stiffness of the node's own faces or of the master face that it touches,
-    whichever is lower; `kernels.contact.contact` says what happens where the node slides on to a softer face.
+    whichever is lower; `kernels.contact.contact` says what happens where the node slides on to a softer face. `flat`:
+    as in `spring_stiffness`.
     """
-    own, *other = spring_stiffness(contact, slave, master)
+    own, *other = spring_stiffness(contact, slave, master, flat)
     if master is None:
         assert isinstance(contact.master, RigidPlane)
         nodes = slave.nodes

@@ -126,11 +126,12 @@ class DampingStage(NodalLoad):
 
         step.split(self.count, launch, NODES)
 
-    def feel(self, state: State, way: Array) -> None:
-        """Count what the forces of the latest step took."""
+    def feel(self, state: State, ahead: State, way: Array) -> None:
+        """Count what the forces took."""
         own = state.parts[self.name]
         moved = way[np.array(self.node.numpy(), dtype=np.int32)]
-        own.taken.assign(own.taken.numpy() - (own.damping.numpy() * moved).sum(axis=1))
+        force = 0.5 * (own.damping.numpy() + ahead.parts[self.name].damping.numpy())
+        own.taken.assign(own.taken.numpy() - (force * moved).sum(axis=1))
 
     def energies_of(self, state: State) -> Sequence[wp.array]:
         """What damping took from each node."""

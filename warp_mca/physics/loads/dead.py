@@ -14,7 +14,7 @@ from warp_mca.base.joining import AS_IS, joinable
 from warp_mca.kernels.loads.nodes import push_nodes
 from warp_mca.physics.loads.faces import corner_areas, lone_corners
 from warp_mca.physics.loads.pushed import PushedNodes, TimedNodes
-from warp_mca.scene.loads import BodyForce, Force
+from warp_mca.scene.loads import LOADS, BodyForce, Force
 from warp_mca.scene.probes import Point
 from warp_mca.system.bodies import Bodies
 from warp_mca.system.stage import Step
@@ -90,6 +90,8 @@ class Stage(PushedNodes):
             wp.array(share[self.order], dtype=wp.float64),
         )
         self.vector = wp.array([item.vector for item in self.items], dtype=wp.vec3d)
+        if LOADS[name] is not BodyForce:  # that acts on mass, as weight does
+            self.may_end(self.listed(self.items)[self.order, None], self.share)
 
     def listed(self, items: Sequence[Any]) -> Index:
         """Nodes of all loads."""
@@ -97,7 +99,7 @@ class Stage(PushedNodes):
 
     def kernels(self) -> list[Any]:
         """That of the forces."""
-        return [push_nodes]
+        return [push_nodes, *(self.lasting.kernels() if self.lasting else [])]
 
     def push(self, step: Step, start: bool = False) -> None:
         """Forces on nodes, and their work."""

@@ -111,6 +111,7 @@ class Stage(PushedNodes):
         found.mode = wp.array([item.mode for item in items], dtype=wp.int32)
         found.traction = wp.array([item.traction for item in items], dtype=wp.vec3d)
         self.corner = wp.array(self.order, dtype=wp.int32)
+        self.may_end(np.concatenate([item.face for item in items]), found.face)
 
     def listed(self, items: Sequence[Any]) -> Index:
         """Corners of all faces."""
@@ -118,7 +119,7 @@ class Stage(PushedNodes):
 
     def kernels(self) -> list[Any]:
         """That of the forces."""
-        return [push_faces]
+        return [push_faces, *(self.lasting.kernels() if self.lasting else [])]
 
     def push(self, step: Step, start: bool = False) -> None:
         """Forces on nodes, and their work."""

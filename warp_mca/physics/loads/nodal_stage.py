@@ -69,10 +69,11 @@ class NodalLoad(Actor):
         """Of each of `Load.readings` at t(n), an entry for each load, shape (len(items),), float64."""
         return []
 
-    def feel(self, state: State, way: Array) -> None:
+    def feel(self, state: State, ahead: State, way: Array) -> None:
         """Count the energy over a way [m] of each node, shape (node_count, 3), that a change of velocities hid.
 
-        The next step counts what nodes moved by the new velocities, though the old ones had moved them.
+        The next step counts what nodes moved by the new velocities, though the old ones had moved them: by the mean of
+        the forces of the latest step, in `state`, and of the next one, in `ahead`.
         """
 
     def record_kernels(self) -> list[Any]:

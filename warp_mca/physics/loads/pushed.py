@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from warp_mca.base.arrays import Array
 from warp_mca.base.joining import AS_IS, joinable, offsets
 from warp_mca.kernels.loads.amplitude import Tables
+from warp_mca.physics.loads.lasting import Lasting
 from warp_mca.physics.loads.nodal_stage import NodalLoad
+from warp_mca.system.actor import When
 from warp_mca.system.loads import LoadedNodes
-from warp_mca.system.stage import Step
+from warp_mca.system.stage import Stage, Step
 
 if TYPE_CHECKING:
     from warp_mca.system.actor import System
@@ -83,7 +85,11 @@ class PushedNodes(NodalLoad):
     Attributes:
         node: those under loads, in rising order, shape (count,), int32.
         order: entries of `listed` by node, of which those of each begin at `begin`.
+        lasting: what ends with elements that fail, or None; `ending` is the array that it writes.
     """
+
+    lasting: Lasting | None = None
+    ending: Any = None
 
     def __init__(self, solver: System, name: str) -> None:
         """Allocate on the current device."""
@@ -108,6 +114,22 @@ class PushedNodes(NodalLoad):
             clock=wp.zeros(self.count, dtype=wp.int32),
         )
 
+    def may_end(self, nodes: Index, ending: Any) -> None:
+        """Let entries end with the elements that have all of their `nodes`, as `Lasting` takes these."""
+        if self.solver.model.fails:
+            self.ending = ending
+            self.lasting = Lasting(self.solver, nodes, wp.clone(ending))
+
+    def stages(self, when: When) -> Iterable[Stage]:
+        """Which loads have ended, ahead of the forces; those of `NodalLoad`."""
+        if when.common and self.lasting:
+            yield Stage("frames", f"ends of loads: {self.name}", self._end)
+        yield from super().stages(when)
+
+    def _end(self, step: Step) -> None:
+        assert self.lasting
+        self.lasting.renew(step.state, self.ending)
+
     def launch(self, kernel: Any, inputs: list[Any], step: Step, start: bool) -> None:
         """Launch a kernel of `kernels.loads.nodes`; `inputs` are those between the nodes and `v`."""
         state, own = step.state, step.state.parts[self.name]
@@ -115,10 +137,11 @@ class PushedNodes(NodalLoad):
         outputs = [self.work.nodal_force, own.force, own.work, own.clock]
         wp.launch(kernel, self.count, inputs=given, outputs=outputs)
 
-    def feel(self, state: State, way: Array) -> None:
-        """Count the work of the forces of the latest step."""
+    def feel(self, state: State, ahead: State, way: Array) -> None:
+        """Count the work of the forces."""
         own = state.parts[self.name]
-        own.work.assign(own.work.numpy() + (own.force.numpy() * way[self.node]).sum(axis=1))
+        force = 0.5 * (own.force.numpy() + ahead.parts[self.name].force.numpy())
+        own.work.assign(own.work.numpy() + (force * way[self.node]).sum(axis=1))
 
     def energies_of(self, state: State) -> list[wp.array]:
         """Work."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
+from warp_mca.base.arrays import Array
 from warp_mca.base.joining import offsets
 from warp_mca.kernels.nodes import spring
 from warp_mca.physics.loads.nodal_stage import NodalLoad
@@ -86,6 +87,16 @@ class SpringsStage(NodalLoad):
         inputs = [self.first, self.springs, work.X, state.u, state.v, self.dt, not start]
         threads, outputs = (self.scenes, self.lanes), [work.nodal_force, kept]
         wp.launch(spring.pull_springs, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK)
+
+    def feel(self, state: State, ahead: State, way: Array) -> None:
+        """Count what dashpots took."""
+        own = state.parts[self.name]
+        tension = 0.5 * (own.damper.numpy() + ahead.parts[self.name].damper.numpy())
+        moved = np.zeros((self.count, 3))
+        for k, item in enumerate(self.items):
+            parts = item.weight[:, None] * way[item.node]
+            moved[k] = parts[item.middle :].sum(axis=0) - parts[: item.middle].sum(axis=0)
+        own.taken.assign(own.taken.numpy() + (tension * moved).sum(axis=1))
 
     def energies_of(self, state: State) -> Sequence[wp.array]:
         """Stored, and taken by dashpots."""
