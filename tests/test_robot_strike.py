@@ -290,6 +290,15 @@ def test_the_arm_from_a_urdf_with_a_mesh_strikes_alike(tmp_path):
     assert 1e-6 * result.F_n.sum() == pytest.approx(3.39, rel=0.005)
 
 
+@pytest.mark.gpu
+def test_arm_strikes_alike_on_a_gpu(tmp_path):
+    machine = arm(tmp_path, flexible={"tool": TOOL}, mounts={"tool": "start"})
+    scene = machine.strike(impact=replace(IMPACT, duration=1e-4))
+    one, other = (mca.run(scene, device=device, precision="float64") for device in ("cpu", "cuda:0"))
+    assert other.F_n == pytest.approx(one.F_n, rel=1e-6, abs=1e-3)
+    assert abs(other.summary["energy"]["error"]) < 3e-3
+
+
 def test_command_prints_a_scene_file_that_strikes(tmp_path, capsys):
     (tmp_path / "arm.xml").write_text(ARM)
     main(["run", str(tmp_path / "arm.xml")])

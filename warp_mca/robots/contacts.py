@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from warp_mca.robots.swing import RobotSwing
     from warp_mca.robots.touching import Pair, Side
 
-AROUND = 24  # faces around a round geom of a rigid link: its neighbours do not touch where one node does
 AHEAD = 2.0  # pairs that are as near as this multiple of the way at the greatest speed may touch during the impact
 STEEL = J2Bilinear(E=210e9, nu=0.3, rho=7850.0, sigma_y=1e12, E_t=0.0)  # of geoms, for springs on flexible bodies
 
@@ -35,11 +34,16 @@ class Contacts:
     """
 
     def __init__(
-        self, robot: Robot, machine: Machine, swing: RobotSwing, duration: float, stiffness: float, mu: float
+        self,
+        robot: Robot,
+        machine: Machine,
+        swing: RobotSwing,
+        duration: float,
+        springs: tuple[float, float, int],
     ) -> None:
-        """Begin without contacts; arguments as in `Robot.strike`."""
+        """Begin without contacts; `springs` are stiffness, mu and faces of `Robot.strike`."""
         self._robot, self._machine, self._swing = robot, machine, swing
-        self._duration, self._stiffness, self._mu = duration, stiffness, mu
+        self._duration, (self._stiffness, self._mu, self._faces) = duration, springs
         self.found: list[Contact] = []
         self.held: list[str] = []
         self._touched: dict[int, list[Array]] = {}  # points of geoms that shall be nodes, in the geoms' frames
@@ -137,9 +141,9 @@ class Contacts:
 
     def _mesh(self, geom: int) -> Mesh:
         mj, name = self._machine.mj, self._sets[geom]
-        surface = geom_surface(mj, self._machine, geom, name, AROUND)
+        surface = geom_surface(mj, self._machine, geom, name, self._faces)
         for point in self._touched.get(geom, ()):
-            surface = with_node(mj, self._machine, geom, surface, point, AROUND)
+            surface = with_node(mj, self._machine, geom, surface, point, self._faces)
         return filled(name, surface, name)
 
     def beside(self) -> list[Body]:

@@ -160,14 +160,15 @@ class Robot:
         mu: float = 0.0,
         swing: RobotSwing | None = None,
         fixed: tuple[Fixed, ...] = (),
+        faces: int = 24,
         name: str = "strike",
     ) -> Scene:
         """The machine at its first touch as a scene, to run, to save or to change: an impact by finite elements.
 
         Flexible links get their meshes, all others are rigid bodies with the file's mass, centre and inertia. Joints
         are Articulations with springs, dampers, friction, armature, limits and drives, which go on acting at the
-        controls that are held. Of the file's geoms those are meshed that may touch within the impact; a round one has
-        24 faces around, and a node where it touches first. Geoms of the world are held. What the file's link has beyond
+        controls that are held. Of the file's geoms those are meshed that may touch within the impact; a round one has a
+        node where it touches first. Geoms of the world are held. What the file's link has beyond
         the mass of its mesh rides on it as a rigid body, "NAME rest", to which it is mounted; where they differ by no
         more than 2 %, the link swings with the mass of its mesh.
 
@@ -176,6 +177,8 @@ class Robot:
             stiffness: of contact between rigid surfaces, of each node [N/m]; others have the default of `Contact`.
             mu: coefficient of friction of all contacts [-]; that of the file is not read.
             swing: how it came there; None: its swing to the first touch.
+            faces: around a round geom [-], whose middles lie 0.0086 of its radius inside at 24. Where round geoms slide
+                along each other take more; the step falls.
             fixed: nodes of bodies beside the machine that are held.
             name: of the scene.
 
@@ -187,12 +190,15 @@ class Robot:
 
         validate.kinds("Robot.strike", ImpactPhase, "give an ImpactPhase", impact=impact)
         validate.positive("Robot.strike", stiffness=stiffness)
+        validate.counts("Robot.strike", faces=faces)
+        if faces % 4 or faces < 8:
+            raise bad_value("Robot.strike.faces", faces, "give a multiple of 4, 8 at least")
         if self.period is not None and self.period < impact.duration:
             remedy = f"controls are held during an impact, which lasts {impact.duration:g} s; give no shorter one"
             raise bad_value("Robot.period", self.period, remedy)
         found = self.swing() if swing is None else swing
         machine = self._machine()
-        scene = HandOff(self, machine, found).scene(impact, self._pairs(machine), stiffness, mu, name)
+        scene = HandOff(self, machine, found).scene(impact, self._pairs(machine), (stiffness, mu, faces), name)
         return replace(scene, fixed=(*scene.fixed, *fixed))
 
     def after(self, swing: RobotSwing, scene: Scene, result: Result) -> HandBack:
