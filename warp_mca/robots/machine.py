@@ -148,14 +148,14 @@ class Machine:
     def own_forces(self, q: Array, v: Array) -> Array:
         """Generalised forces of limits and dry friction, shape (nv,), float64.
 
-        A limit presses with k d + c d' where the joint is beyond it by d > 0, and never pulls. Dry friction is its
-        whole force times tanh(rate / FRICTION_RATE).
+        A limit gives -(k d + c d') where the joint is beyond it by d, as in an impact. Dry friction is its whole force
+        times tanh(rate / FRICTION_RATE).
         """
         force = -self._friction * np.tanh(v / FRICTION_RATE)
         at, rate = q[self.limited_q], v[self.limited]
-        for depth, sign in ((at - self.range[:, 1], 1.0), (self.range[:, 0] - at, -1.0)):
-            press = np.maximum(self.limit_stiffness * depth + self.limit_damping * sign * rate, 0.0)
-            force[self.limited] -= np.where(depth > 0.0, sign * press, 0.0)
+        beyond = at - np.clip(at, self.range[:, 0], self.range[:, 1])
+        held = self.limit_stiffness * beyond + self.limit_damping * rate
+        force[self.limited] -= np.where(beyond != 0.0, held, 0.0)
         return force
 
     def advance(self, y: Array) -> Any:

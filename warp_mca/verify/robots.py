@@ -130,8 +130,8 @@ def four_bar(setup: Setup) -> list[Row]:
 
 @case(
     group="rigid",
-    title="A limit of a robot file's hinge lets go at e^-2 of the rate that it met",
-    reference="Critical damping: depth v t exp(-w t), at most v / (e w); no force from w t = 2 on, at -v exp(-2).",
+    title="A limit of a robot file's hinge stops it as a spring with critical damping does",
+    reference="Depth v t exp(-w t), at most v / (e w); rate v (1 - w t) exp(-w t), -3 v exp(-4) at w t = 4.",
     needs="mujoco",
     elements=(),
 )
@@ -140,10 +140,10 @@ def limit_stop(setup: Setup) -> list[Row]:
     del setup
     from warp_mca.robots.machine import LIMIT_RATE
 
-    found = swung(STOP, t_end=0.5 / RATE + 2e-3, qvel=(RATE,))
+    found = swung(STOP, t_end=0.5 / RATE + 4.0 / LIMIT_RATE, qvel=(RATE,))
     depth = float(swung(STOP, t_end=0.5 / RATE + 1.0 / LIMIT_RATE, qvel=(RATE,)).qpos[0]) - 0.5
     return [
-        Row("rate after the stop", -RATE * math.exp(-2.0), (found.qvel[0],), "rad/s", 1e-7, TOLERANCE),
+        Row("rate as it is pushed back", -3.0 * RATE * math.exp(-4.0), (found.qvel[0],), "rad/s", 1e-7, TOLERANCE),
         Row("depth of the stop", RATE / (math.e * LIMIT_RATE), (depth,), "rad", 1e-7, TOLERANCE),
     ]
 
