@@ -72,6 +72,16 @@ def test_odd_freedoms_are_refused(given, said):
     assert said in str(error.value)
 
 
+def test_phases_before_the_impact_and_contact_without_surface_are_refused():
+    weld = mca.Weld(name="W", body="a")
+    with pytest.raises(mca.RequestError, match=r"Scene.phases = 'given': joints between whole bodies, as Weld W, take"):
+        scene_of(weld, phases=(mca.Settle(),))
+    floor = mca.RigidPlane(point=(0.0, 0.0, 0.0), normal=(0.0, 0.0, 1.0))
+    contact = mca.Contact(slave=mca.Surface(body="a", nodes="inertia"), master=floor)
+    with pytest.raises(mca.RequestError, match=r"Contact.slave.body = 'a': it is a mass without surface"):
+        scene_of(contacts=(contact,))
+
+
 def test_words_survive_a_model_file(tmp_path):
     servo = mca.PositionServo(kp=10.0, kv=1.0, target=mca.Amplitude(times=(0.0, 1.0), values=(0.0, 1.0)))
     freedoms = (mca.Freedom(axis=(0, 1, 0), motor=servo, limits=(-1, 1)), mca.Freedom(kind="slide", at=(0, 0, 1)))
@@ -194,6 +204,7 @@ def test_a_mesh_with_a_mass_of_its_own_has_that_mass_and_inertia():
     result = mca.run(mca.Scene(name="s", bodies=(body,), impact=impact), device="cpu", precision="float64")
     own = result.summary["rigid_bodies"]["b"]
     assert own["mass"] == pytest.approx(5.0, rel=1e-12)
+    assert result.summary["bodies"]["b"] == {"mass": 5.0, "mass_error": None}
     assert own["momentum"] == pytest.approx(5.0 * np.cross(w, [0.02, 0.0, 0.01]), rel=1e-12)
     assert own["spin"] == pytest.approx(np.array(inertia) @ w, rel=1e-12)
     assert not result.warnings
@@ -283,3 +294,20 @@ def test_batches_and_model_files_take_no_functions(tmp_path):
         mca.run_batch([scene, scene], device="cpu")
     with pytest.raises(mca.RequestError, match=r"Freedom.motor = 'Controller': a model file holds no functions"):
         model_file.save(tmp_path / "a.mca", scene, mca.mesh(scene))
+
+
+def test_welded_links_are_one_body():
+    """Without any freedom: two welded halves turn as a whole does, through the joint's force m_b w^2 r alone."""
+    w = (0.0, 0.0, 3.0)
+    bodies = (
+        mca.Body(name="a", **LINK, angular_velocity=w),
+        mca.Body(name="b", **LINK, position=(0.5, 0.0, 0.0), velocity=(0.0, 1.5, 0.0), angular_velocity=w),
+    )
+    impact = mca.ImpactPhase(duration=0.1, output_interval=1e-2, time_step_scale=0.1)
+    joint = mca.Weld(name="W", body="b", other="a")
+    result = mca.run(mca.Scene(name="s", bodies=bodies, joints=(joint,), impact=impact), device="cpu")
+    force = np.hypot(result["joint_W_Fx_N"], result["joint_W_Fy_N"])[1:]
+    assert force == pytest.approx(2.0 * 3.0**2 * 0.25, rel=1e-3)
+    assert result["E_kinetic"] == pytest.approx(result["E_kinetic"][0], rel=1e-12)
+    spins = [result.summary["rigid_bodies"][name]["spin"][2] for name in "ab"]
+    assert spins == pytest.approx([3.0 * 0.25] * 2, rel=1e-9)

@@ -86,6 +86,7 @@ CATCHES: dict[str, tuple[str, ...]] = {
     "jointed_tree": ("freedom_not_carried", "rotor_halved"),
     "free_chain": ("joint_forgets_second",),
     "wrist": ("cluster_moment_lost",),
+    "jointed_strike": ("rotor_halved", "joint_forgets_second"),
     "four_bar_loop": ("joint_forgets_second",),
     "slider_and_cross": ("freedom_not_carried",),
     "joint_drives": ("rotor_halved",),

@@ -6,49 +6,14 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.edge_shares import slid_off
-from warp_mca.kernels.contact.edges import SlaveFaces, area_vector
+from warp_mca.kernels.contact.edges import SlaveFaces
 from warp_mca.kernels.contact.pairs import Pairs, may_meet, spring_of
-from warp_mca.kernels.contact.projection import project_on_face
-from warp_mca.kernels.contact.search import EQUAL, OVERFLOW, distance_to_face, list_slave, root_function
+from warp_mca.kernels.contact.projection import distance_to_face, project_on_face
+from warp_mca.kernels.contact.search import EQUAL, is_listed, root_function
 from warp_mca.kernels.contact.spring import ANY_DEPTH, Spring
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 
 _NONE = 1 << 30  # larger than the number of any body
-
-
-@wp.func
-def opposes(
-    X: wp.array(dtype=wp.vec3d),
-    u: wp.array(dtype=wp.vec3d),
-    slaves: SlaveFaces,
-    s: int,
-    face: wp.array2d(dtype=wp.int32),
-    f: int,
-) -> bool:
-    """Whether a face around slave node s looks against face f: else that is the far side of a layer."""
-    normal = area_vector(X, u, face, f)
-    found = bool(False)
-    for j in range(slaves.offset[s], slaves.offset[s + 1]):
-        own = area_vector(X, u, slaves.face, slaves.face_of_slave[j])
-        found = found or wp.dot(own, normal) < wp.float64(0.0)
-    return found
-
-
-@wp.func
-def is_listed(
-    X: wp.array(dtype=wp.vec3d),
-    u: wp.array(dtype=wp.vec3d),
-    slaves: SlaveFaces,
-    s: int,
-    face: wp.array2d(dtype=wp.int32),
-    f: int,
-    pairs: Pairs,
-) -> bool:
-    """Whether slave node s may touch face f until the next search."""
-    found = may_meet(pairs, s, f)
-    if found and pairs.own[s] == pairs.body[f]:
-        found = opposes(X, u, slaves, s, face, f)
-    return found
 
 
 @cache
@@ -109,53 +74,6 @@ def slots_kernel(each: bool, sides: int) -> Any:
                 slot_out[s, q] = lowest
 
     return find_slots
-
-
-@cache
-def candidates_kernel(each: bool, sides: int) -> Any:
-    """Kernel: as `search.candidates_kernel`, for a general contact, with `sides` springs for each slave node."""
-    of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
-    of_face, Side, root_of = value_function(sides > 1), kind(wp.int32, sides > 1), root_function(each)
-
-    @wp.kernel(enable_backward=False, module="unique")
-    def find_pair_candidates(
-        bvh: wp.uint64,
-        X: wp.array(dtype=wp.vec3d),
-        u: wp.array(dtype=wp.vec3d),
-        slaves: SlaveFaces,
-        face: wp.array2d(dtype=wp.int32),
-        pairs: Pairs,
-        side: Side,
-        scene: Index,
-        origin: Vector,
-        count_out: wp.array(dtype=wp.int32),
-        candidate_out: wp.array2d(dtype=wp.int32),
-        face_count_out: wp.array(dtype=wp.int32),
-        face_slave_out: wp.array2d(dtype=wp.int32),
-        u_search_out: wp.array(dtype=wp.vec3d),
-        flag_out: wp.array2d(dtype=wp.int32),
-    ):
-        s = wp.tid()
-        i = slaves.node[s]
-        u_search_out[i] = u[i]
-        k = of(scene, s)
-        point = wp.vec3f(X[i] + u[i] - of(origin, k))
-        for e in range(wp.static(sides) * s, wp.static(sides) * (s + 1)):
-            count_out[e] = 0
-        f = int(0)
-        query = wp.bvh_query_aabb(bvh, point, point, root_of(bvh, k))
-        while wp.bvh_query_next(query, f):
-            if is_listed(X, u, slaves, s, face, f, pairs):
-                e = spring_of(pairs, s, f, of_face(side, f), wp.static(sides))
-                found = count_out[e]
-                if found < candidate_out.shape[1]:
-                    candidate_out[e, found] = f
-                    count_out[e] = found + 1
-                    list_slave(f, e, k, face_count_out, face_slave_out, flag_out)
-                else:
-                    flag_out[k, OVERFLOW] = 1
-
-    return find_pair_candidates
 
 
 @cache

@@ -180,3 +180,29 @@ def is_edge(
             if face[f, a] == face[g, b]:
                 shared = bool(True)
     return shared and lies_below(X, u, face, f, g, normal)
+
+
+@wp.func
+def distance_to_face(
+    X: wp.array(dtype=wp.vec3d),
+    u: wp.array(dtype=wp.vec3d),
+    face: wp.array2d(dtype=wp.int32),
+    f: int,
+    x: wp.vec3d,
+    at: wp.vec2d,
+    triangle: bool,
+) -> wp.float64:
+    """Distance of a point to a face, whose natural coordinates `at` of the foot may lie beyond its edges [m]."""
+    one = wp.float64(1.0)
+    on = wp.vec2d(wp.clamp(at[0], -one, one), wp.clamp(at[1], -one, one))
+    if triangle:
+        on = wp.vec2d(wp.max(at[0], wp.float64(0.0)), wp.max(at[1], wp.float64(0.0)))
+        on = on / wp.max(on[0] + on[1], one)
+    foot = interpolate(
+        weights_at(on, triangle),
+        X[face[f, 0]] + u[face[f, 0]] - x,
+        X[face[f, 1]] + u[face[f, 1]] - x,
+        X[face[f, 2]] + u[face[f, 2]] - x,
+        X[face[f, 3]] + u[face[f, 3]] - x,
+    )
+    return wp.length(foot)

@@ -5,7 +5,9 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.contact.projection import interpolate, project_on_face, weights_at
+from warp_mca.kernels.contact.edges import SlaveFaces
+from warp_mca.kernels.contact.pairs import Pairs, may_meet, spring_of
+from warp_mca.kernels.contact.projection import area_vector, distance_to_face, project_on_face
 from warp_mca.kernels.hardware.per_scene import kind, value_function
 
 # Entries of the flag array that the host reads with every batch of records.
@@ -98,23 +100,61 @@ def bounds_kernel(each: bool) -> Any:
     return face_bounds
 
 
+@wp.func
+def opposes(
+    X: wp.array(dtype=wp.vec3d),
+    u: wp.array(dtype=wp.vec3d),
+    slaves: SlaveFaces,
+    s: int,
+    face: wp.array2d(dtype=wp.int32),
+    f: int,
+) -> bool:
+    """Whether a face around slave node s looks against face f: else that is the far side of a layer."""
+    normal = area_vector(X, u, face, f)
+    found = bool(False)
+    for j in range(slaves.offset[s], slaves.offset[s + 1]):
+        own = area_vector(X, u, slaves.face, slaves.face_of_slave[j])
+        found = found or wp.dot(own, normal) < wp.float64(0.0)
+    return found
+
+
+@wp.func
+def is_listed(
+    X: wp.array(dtype=wp.vec3d),
+    u: wp.array(dtype=wp.vec3d),
+    slaves: SlaveFaces,
+    s: int,
+    face: wp.array2d(dtype=wp.int32),
+    f: int,
+    pairs: Pairs,
+) -> bool:
+    """Whether slave node s may touch face f until the next search."""
+    found = may_meet(pairs, s, f)
+    if found and pairs.own[s] == pairs.body[f]:
+        found = opposes(X, u, slaves, s, face, f)
+    return found
+
+
 @cache
-def candidates_kernel(each: bool, sides: int) -> Any:
+def candidates_kernel(each: bool, sides: int, general: bool = False) -> Any:
     """Kernel: list the faces near each slave node, and the slaves near each face; a full list raises the flag.
 
     The caller sets the counts of the slaves to 0. With `each`, faces are grouped by scene, and a slave searches the
-    faces of its scene only. If the master has several sides, a slave has a list for each side, and faces list the
-    number of that list in place of the slave.
+    faces of its scene only. If a slave has several springs, for sides of the master or for bodies of a `general`
+    contact, it has a list for each, and faces list the number of that list in place of the slave. Of a listed contact
+    without sides, `slaves` have their `node` alone.
     """
     of, Vector, Index = value_function(each), kind(wp.vec3d, each), kind(wp.int32, each)
     of_face, Side, root_of = value_function(sides > 1), kind(wp.int32, sides > 1), root_function(each)
 
-    @wp.kernel(enable_backward=False, module="unique" if each or sides > 1 else None)
+    @wp.kernel(enable_backward=False, module="unique" if each or general or sides > 1 else None)
     def find_candidates(
         bvh: wp.uint64,
         X: wp.array(dtype=wp.vec3d),
         u: wp.array(dtype=wp.vec3d),
-        slave: wp.array(dtype=wp.int32),
+        slaves: SlaveFaces,
+        face: wp.array2d(dtype=wp.int32),
+        pairs: Pairs,
         side: Side,
         scene: Index,
         origin: Vector,
@@ -126,59 +166,31 @@ def candidates_kernel(each: bool, sides: int) -> Any:
         flag_out: wp.array2d(dtype=wp.int32),
     ):
         s = wp.tid()
-        i = slave[s]
+        i = slaves.node[s]
         u_search_out[i] = u[i]
         k = of(scene, s)
-        x = X[i] + u[i] - of(origin, k)
-        point = wp.vec3f(wp.float32(x[0]), wp.float32(x[1]), wp.float32(x[2]))
-        query = wp.bvh_query_aabb(bvh, point, point, root_of(bvh, k))
+        point = wp.vec3f(X[i] + u[i] - of(origin, k))
+        for e in range(wp.static(sides) * s, wp.static(sides) * (s + 1)):
+            count_out[e] = 0
         f = int(0)
-        found = int(0)
-        if wp.static(sides > 1):
-            for p in range(wp.static(sides)):
-                count_out[wp.static(sides) * s + p] = 0
+        query = wp.bvh_query_aabb(bvh, point, point, root_of(bvh, k))
         while wp.bvh_query_next(query, f):
-            row = wp.static(sides) * s + of_face(side, f)
-            if wp.static(sides > 1):
-                found = count_out[row]
-            if found < candidate_out.shape[1]:
-                candidate_out[row, found] = f
-                list_slave(f, row, k, face_count_out, face_slave_out, flag_out)
-            else:
-                flag_out[k, OVERFLOW] = 1
-            found += 1
-            if wp.static(sides > 1):
-                count_out[row] = wp.min(found, candidate_out.shape[1])
-        if wp.static(sides == 1):
-            count_out[s] = wp.min(found, candidate_out.shape[1])
+            listed = bool(True)
+            if wp.static(general):
+                listed = is_listed(X, u, slaves, s, face, f, pairs)
+            if listed:
+                e = wp.static(sides) * s + of_face(side, f)
+                if wp.static(general):
+                    e = spring_of(pairs, s, f, of_face(side, f), wp.static(sides))
+                found = count_out[e]
+                if found < candidate_out.shape[1]:
+                    candidate_out[e, found] = f
+                    count_out[e] = found + 1
+                    list_slave(f, e, k, face_count_out, face_slave_out, flag_out)
+                else:
+                    flag_out[k, OVERFLOW] = 1
 
     return find_candidates
-
-
-@wp.func
-def distance_to_face(
-    X: wp.array(dtype=wp.vec3d),
-    u: wp.array(dtype=wp.vec3d),
-    face: wp.array2d(dtype=wp.int32),
-    f: int,
-    x: wp.vec3d,
-    at: wp.vec2d,
-    triangle: bool,
-) -> wp.float64:
-    """Distance of a point to a face, whose natural coordinates `at` of the foot may lie beyond its edges [m]."""
-    one = wp.float64(1.0)
-    on = wp.vec2d(wp.clamp(at[0], -one, one), wp.clamp(at[1], -one, one))
-    if triangle:
-        on = wp.vec2d(wp.max(at[0], wp.float64(0.0)), wp.max(at[1], wp.float64(0.0)))
-        on = on / wp.max(on[0] + on[1], one)
-    foot = interpolate(
-        weights_at(on, triangle),
-        X[face[f, 0]] + u[face[f, 0]] - x,
-        X[face[f, 1]] + u[face[f, 1]] - x,
-        X[face[f, 2]] + u[face[f, 2]] - x,
-        X[face[f, 3]] + u[face[f, 3]] - x,
-    )
-    return wp.length(foot)
 
 
 @cache

@@ -44,6 +44,8 @@ def robot_script(name: str) -> str:
     path = Path(name).resolve()
     machine = Machine(Robot(path))
     keys = [key for key in machine.keyframes if key]
+    if keys:
+        machine = Machine(Robot(path, keyframe=keys[0]))
     more = f', keyframe="{keys[0]}"' if keys else ""
     if not machine.meets_the_world:
         more += ", against=(mca.RigidPlane(normal=(0.0, 0.0, 1.0)),)"

@@ -132,8 +132,8 @@ def check_whole(scene: Scene) -> None:
     """Refuse joints of whole bodies that cannot be, and contact of bodies without geometry.
 
     Raises:
-        RequestError: both bodies are flexible, a flexible one has no node set, a rigid one has, the scene swings, or
-            such a body is in contact.
+        RequestError: both bodies are flexible, a flexible one has no node set, a rigid one has, the scene has
+            phases before the impact, or such a body is in contact.
     """
     rigid = set(scene.rigid_names)
     bare = {body.name for body in scene.bodies if body.is_inertia}
@@ -162,8 +162,8 @@ def check_whole(scene: Scene) -> None:
         for freedom in whole.freedoms:
             if isinstance(freedom.motor, Controller):
                 _check_period(freedom.motor, scene.impact.output_interval)
-        if scene.phases and any(freedom.motor for freedom in whole.freedoms):
-            remedy = f"times of motors of {joint.title} count from the impact; leave phases out"
+        if scene.phases:
+            remedy = f"joints between whole bodies, as {joint.title}, take part in the impact alone; leave phases out"
             raise bad_value("Scene.phases", "given", remedy)
 
 

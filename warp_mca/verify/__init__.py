@@ -44,6 +44,7 @@ FILES = (
     "robots",
     "body_joints",
     "joint_loops",
+    "jointed_impacts",
     "loads",
 )
 

@@ -236,7 +236,8 @@ class Ledger:
     def exchanges(self) -> bool:
         """Whether bodies exchanged energy worth a word, by contact, joints or external work."""
         least = (MIN_EXCHANGE if self.kept.touched else MIN_FREE_EXCHANGE) * self.kept.energy_scale
-        met = self.kept.touched or len(self.model.joint_first) > 0 or self.kept.worked > least
+        joined = len(self.model.joint_first) > 0 or bool(self.model.body_joints)
+        met = self.kept.touched or joined or self.kept.worked > least
         return met and self.kept.exchanged > max(least, self.rounding)
 
     @property

@@ -24,7 +24,8 @@ def body_report(
 ) -> dict[str, dict[str, float | None]]:
     """Mass [kg] of each body, without what mass scaling adds, and error [-] of the mass of its cells, by its name.
 
-    The error is None where nothing is known of the shape that the mesh stands for. `points` count as mass alone.
+    The error is None where nothing is known of the shape that the mesh stands for, and where the mass is given.
+    `points` count as mass alone.
     """
     found: dict[str, dict[str, float | None]] = {}
     for body in bodies:
@@ -34,7 +35,8 @@ def body_report(
         cells, shape = (mass / ratio, mass) if body.exact_mass else (mass, mass * ratio)
         error = float(cells.sum() / shape.sum()) - 1.0 if len(mesh.volume_ratio) else None
         carried = sum(item.mass for item in points if item.body == body.name)
-        found[body.name] = {"mass": float(mass.sum()) + carried, "mass_error": error}
+        own, error = (float(mass.sum()), error) if body.mass is None else (body.mass, None)
+        found[body.name] = {"mass": own + carried, "mass_error": error}
     return found
 
 

@@ -189,7 +189,7 @@ def _foreign(c: Context) -> Iterator[tuple[str, Mesh]]:
 def _missing_mass(c: Context, most: float, exact: bool) -> Iterator[Values]:
     for body in c.scene.bodies:
         coarse = (np.abs(1.0 / c.meshes[body.name].volume_ratio - 1.0) > most).any()
-        if coarse and body.exact_mass == exact:
+        if coarse and body.exact_mass == exact and body.mass is None:
             error = body_report([body], c.meshes)[body.name]["mass_error"]
             if error is not None and abs(error) > most:
                 yield dict(body=body.name, share=abs(error), than="less" if error < 0.0 else "more")

@@ -64,9 +64,8 @@ class ContactStage:
         self.lanes = contact.LANES if wp.get_device().is_cuda else 1
         self.react = contact.react_kernel(self.each, self.lanes, self.noted)
         self.bounds = search.bounds_kernel(self.each)
-        kernels = pair_search if self.general else search
-        self.find = kernels.candidates_kernel(self.each, self.sides)
-        self.clear = kernels.clear_kernel(self.each, self.sides)
+        self.find = search.candidates_kernel(self.each, self.sides, self.general)
+        self.clear = (pair_search if self.general else search).clear_kernel(self.each, self.sides)
         self.slots = pair_search.slots_kernel(self.each, self.sides) if self.general and self.sides > 1 else None
         self._make_faces(model)
 
@@ -138,6 +137,8 @@ class ContactStage:
         self.master = wp.array(self._join("master"), dtype=wp.int32)
         self.face_offset, self.face_of_node = self._rows("face", "face_offset", "face_of_node")
         self.pairs, self.edges = device_pairs([item.pairs for item in self.items]), None
+        self.slave_faces = edges.SlaveFaces()
+        self.slave_faces.node = self.slave
         if self.sides > 1 or self.general:
             rows = self._rows("slave_face", "slave_offset", "face_of_slave")
             self.slave_faces = faces_of_slaves(self, self._join("slave_face"), rows)
@@ -217,9 +218,9 @@ class ContactStage:
         """Second part of a search: the lists, which contact reads."""
         if self.on_plane:
             return
-        own, places = state.contacts[self.index], [self.bvh.id, work.X, u]
+        own = state.contacts[self.index]
         own.face_count.zero_()
-        inputs = [*places, *([self.slave_faces, self.face, self.pairs_of(own)] if self.general else [self.slave])]
+        inputs = [self.bvh.id, work.X, u, self.slave_faces, self.face, self.pairs_of(own)]
         if self.slots:
             spaces = [self.slave_scene, self.origin, own.spring]
             wp.launch(self.slots, len(self.slave), inputs=[*inputs, *spaces], outputs=[own.slot])

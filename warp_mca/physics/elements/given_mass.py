@@ -15,7 +15,7 @@ from warp_mca.geometry.inertia_brick import CARRIERS, LEAST, corner_points
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.scene.bodies import Body
 
-HALVINGS = 60  # of the share that the mesh keeps, from one half on
+HALVINGS = 50  # of the share that the mesh keeps; flat inertias leave it next to nothing
 
 
 def mesh_with_carriers(body: Body, mesh: Mesh, volumes: Array) -> Mesh:
@@ -55,12 +55,13 @@ def _rest(body: Body, points: Array, volumes: Array) -> tuple[float, Array, Arra
     arm = points - centre
     share = volumes / volumes.sum()
     first, moment = share @ arm, np.einsum("n,ni,nj->ij", share, arm, arm)
-    for halving in range(1, HALVINGS):
+    halving = 0
+    while True:
+        halving += 1
         own = 0.5**halving
         mean = -own * first / (1.0 - own)
         rest = second / body.mass - own * moment - (1.0 - own) * np.outer(mean, mean)
         least, *_, most = np.linalg.eigvalsh(rest)
-        if least > LEAST * most:
-            break
-    rest = rest * body.mass
-    return (1.0 - own) * body.mass, centre + mean, np.trace(rest) * np.eye(3) - rest
+        if least > LEAST * most or halving == HALVINGS:
+            rest = rest * body.mass
+            return (1.0 - own) * body.mass, centre + mean, np.trace(rest) * np.eye(3) - rest
