@@ -41,6 +41,7 @@ PAGES = (
     "how-to/rigid_plane.md",
     "how-to/boundary.md",
     "how-to/loads.md",
+    "how-to/robots.md",
     "how-to/units.md",
     "how-to/stopped.md",
 )

@@ -1,5 +1,6 @@
 """Contact springs depend on what touches, and on nothing else; their default suits flat and curved surfaces."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -128,3 +129,30 @@ def test_default_suits_any_poissons_ratio(nu: float):
     ball = mca.make_scene("hertz_sphere", nu=nu, section=4, pole_size=2e-4)
     result = mca.run(replace(ball, contacts=(replace(ball.contacts[0], penalty=None),)))
     assert result["E_contact"].max() < 0.1 * result["E_internal"].max()
+
+
+def test_stiffness_of_its_own_is_that_of_the_node_that_touches():
+    """A rigid octahedron falls on its corner: F = v sqrt(m k), for pi sqrt(m / k), whatever the cells are."""
+    corners = 0.01 * np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1], [0, 0, 0]], float)
+    cells = [[6, k, (k + 1) % 4, 4] for k in range(4)] + [[6, (k + 1) % 4, k, 5] for k in range(4)]
+    tetrahedra = np.array(cells, dtype=np.int32)
+    mesh = mca.Mesh(points=corners, hexahedra=np.zeros((0, 8), np.int32), tetrahedra=tetrahedra)
+    steel = mca.Elastic(E=210e9, nu=0.3, rho=7800.0)
+    body = mca.Body(
+        name="top", geometry=mesh, material=steel, rigid=True, position=(0.0, 0.0, 0.01), velocity=(0.0, 0.0, -1.0)
+    )
+    floor = mca.RigidPlane(normal=(0.0, 0.0, 1.0))
+    contact = mca.Contact(slave=mca.Surface(body="top", nodes="boundary"), master=floor, stiffness=1e6)
+    mass = 7800.0 * 4.0 / 3.0 * 1e-6
+    duration = math.pi * math.sqrt(mass / 1e6)
+    impact = mca.ImpactPhase(duration=1.1 * duration, output_interval=duration / 200.0)
+    result = mca.run(mca.Scene(name="corner", bodies=(body,), contacts=(contact,), impact=impact))
+    assert result.summary["extremes"]["F_n_max"] == pytest.approx(math.sqrt(mass * 1e6), rel=1e-4)
+    assert np.count_nonzero(result.F_n) == pytest.approx(200, abs=2)
+
+
+@pytest.mark.parametrize("more", [{"penalty": 3.0}, {"bond": mca.Bond(normal=1e6)}])
+def test_stiffness_of_its_own_stands_alone(more):
+    sides = {"slave": mca.Surface(body="a", nodes="zmin"), "master": mca.Surface(body="b", nodes="zmax")}
+    with pytest.raises(mca.RequestError, match=r"Contact\.stiffness = 1000000\.0: leave it or"):
+        mca.Contact(**sides, stiffness=1e6, **more)

@@ -82,6 +82,7 @@ if TYPE_CHECKING:
     from warp_mca.results.cfc import cfc_filter
     from warp_mca.results.result import Result
     from warp_mca.results.storage import load
+    from warp_mca.robots.robot import Robot
     from warp_mca.scene.catalogue import make_scene
     from warp_mca.scene.parameters import Param
     from warp_mca.studies.batch import run_batch
@@ -100,6 +101,7 @@ _LAZY = {
     "Rod": "warp_mca.geometry",
     "Select": "warp_mca.geometry",
     "Sphere": "warp_mca.geometry",
+    "Robot": "warp_mca.robots.robot",
     "Param": "warp_mca.scene.parameters",
     "Accuracy": "warp_mca.accuracy.request",
     "make_scene": "warp_mca.scene.catalogue",
@@ -204,6 +206,7 @@ __all__ = [
     "tradeoff",
     "load",
     "Result",
+    "Robot",
     "McaError",
     "RequestError",
     "GuardError",

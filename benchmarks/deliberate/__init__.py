@@ -12,6 +12,7 @@ from benchmarks.deliberate.failure_mutations import FAILURE_MUTATIONS
 from benchmarks.deliberate.load_mutations import LOAD_MUTATIONS
 from benchmarks.deliberate.mutation import Mutation
 from benchmarks.deliberate.rigid_mutations import RIGID_MUTATIONS
+from benchmarks.deliberate.robot_mutations import ROBOT_MUTATIONS
 
 MUTATIONS: dict[str, Mutation] = {
     "shear_modulus_doubled": Mutation(
@@ -319,7 +320,7 @@ MUTATIONS: dict[str, Mutation] = {
     ),
 } | ELEMENT_MUTATIONS
 
-MUTATIONS |= RIGID_MUTATIONS | LOAD_MUTATIONS | DAMPING_MUTATIONS | FAILURE_MUTATIONS
+MUTATIONS |= RIGID_MUTATIONS | ROBOT_MUTATIONS | LOAD_MUTATIONS | DAMPING_MUTATIONS | FAILURE_MUTATIONS
 
 
 def notes() -> dict[str, str]:

@@ -18,6 +18,13 @@ def rotation_matrix(rotation_vector: Sequence[float] | Array) -> Array:
     return Rotation.from_rotvec(rotation_vector).as_matrix()
 
 
+def rotation_vector(quaternion: Sequence[float] | Array) -> Array:
+    """Rotation vector [rad], shape (3,), float64, of a unit quaternion (x, y, z, w)."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_quat(quaternion).as_rotvec()
+
+
 def best_rotation(a: Array, b: Array, weights: Array) -> Array:
     """Rotation R, shape (3, 3), float64, with the least sum w |b - R a|^2 (Kabsch, Acta Cryst. A 32 (1976) 922).
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import warp_mca as mca
 from warp_mca.base.errors import bad_value
 from warp_mca.base.outside import import_named
-from warp_mca.cli import part_script
+from warp_mca.cli import part_script, robot_script
 from warp_mca.scene import Scene, catalogue, model_file
 from warp_mca.scene.elements import ELEMENTS
 from warp_mca.scene.model_file import SUFFIX, Origin
@@ -47,6 +47,8 @@ def read_request(args: argparse.Namespace) -> Request:
 
 def read_requests(args: argparse.Namespace, settings: Sequence[Mapping[str, str]]) -> list[Request]:
     """Build the scenes that the arguments ask for, each with some parameters changed; their file is read once."""
+    if robot_script.is_robot(args.scene):
+        raise robot_script.no_scene(args.scene)
     if part_script.is_part(args.scene):
         raise part_script.no_scene(args.scene)
     for name in args.imports:

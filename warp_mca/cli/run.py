@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import warp_mca as mca
 from warp_mca.base.errors import CriterionError, McaError, bad_value
 from warp_mca.base.log import LOGGER
-from warp_mca.cli import part_script, sweep
+from warp_mca.cli import part_script, robot_script, sweep
 from warp_mca.cli.accuracy import accuracy_asked
 from warp_mca.cli.own_recorder import own_recorder
 from warp_mca.cli.request import read_request
@@ -27,7 +27,7 @@ DRAWING = {"frames": 100, "field": "von_mises", "magnify": 1.0}  # options for r
 
 
 def run(args: argparse.Namespace) -> None:
-    """Run a scene or a sweep, and print what came of it; of a part, print a scene file."""
+    """Run a scene or a sweep, and print what came of it; of a part or a robot, print a scene file."""
     from warp_mca.base.progress import progress_bar
     from warp_mca.cli.console import print_summary
     from warp_mca.results.criteria import unmet
@@ -35,6 +35,9 @@ def run(args: argparse.Namespace) -> None:
 
     if args.sweeps:
         _sweep(args)
+        return
+    if robot_script.is_robot(args.scene):
+        robot_script.print_script(args.scene)
         return
     if part_script.is_part(args.scene):
         part_script.print_script(args.scene)

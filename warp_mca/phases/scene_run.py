@@ -19,6 +19,7 @@ from warp_mca.results.result import Result, summarise
 from warp_mca.results.sensor_history import sensor_figures
 from warp_mca.scene.contacts import contact_names
 from warp_mca.step.state_figures import (
+    flexible_bodies,
     joint_impulses,
     max_normal_force,
     max_penetration,
@@ -153,6 +154,8 @@ class SceneRun:
             found["rigid_bodies"] = rigid_bodies(*of_scene)
         if self.ready.model.body_joints:
             found["joints"] = joint_reports(*of_scene, history_columns(self.ledger))
+            names = [body.name for body in self.ready.scene.bodies if not body.rigid]
+            found["flexible_bodies"] = flexible_bodies(self.ready.model, self.looks.nodes, self.state, names)
         return found
 
     def _facts(self, wall: Mapping[str, float], shares: Mapping[str, SpringShare | None]) -> dict[str, Any]:

@@ -111,6 +111,8 @@ class Contact(_Springs):
             f = 3.8 where a surface is curved. Where both are flat, nodes share, by their area, springs that are as
             stiff as two cells of each surface, so that flat ends do not ring. "auto" chooses f from mesh, curvature,
             mass and speed, so that springs hold at most some 7 % of the energy.
+        stiffness: of the spring of each slave node in place of that [N/m], whatever its faces; with two_way of each
+            node of the master too. For rigid bodies, whose cells say nothing of it.
         law: force along the normal over depth and stiffness. None takes `Penalty`, or `DampedPenalty` where bodies lie
             on each other under their weight, with half of critical damping up to the speeds that weight gives.
         friction: law that changes the limit mu F_n of the friction force, or several that do in turn, as
@@ -142,9 +144,12 @@ class Contact(_Springs):
     law: ContactLaw | None = None
     friction: FrictionLaw | tuple[FrictionLaw, ...] = ()
     bond: Bond | None = None
+    stiffness: float | None = None
 
     def __post_init__(self) -> None:
         self._check_springs()
+        if self.stiffness is not None:
+            self._check_stiffness(self.stiffness)
         validate.kinds("Contact", Surface, "give a Surface", slave=self.slave)
         validate.kinds("Contact", (Surface, RigidPlane), "give a Surface or a RigidPlane", master=self.master)
         if self.two_way is not None:
@@ -157,6 +162,12 @@ class Contact(_Springs):
         self._check_bond()
         axes = {"normal": self.normal, "tangent": self.tangent}
         validate.directions("Contact", **{name: axis for name, axis in axes.items() if axis is not None})
+
+    def _check_stiffness(self, stiffness: float) -> None:
+        validate.positive("Contact", stiffness=stiffness)
+        for name in ("penalty", "bond"):
+            if getattr(self, name) is not None:
+                raise bad_value("Contact.stiffness", stiffness, f"leave it or {name} out")
 
     def _check_bond(self) -> None:
         validate.kinds("Contact", (Bond, NoneType), "give a Bond or None", bond=self.bond)

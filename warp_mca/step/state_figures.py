@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
+
+import numpy as np
+
+from warp_mca.base.rotation import rotation_vector
 
 if TYPE_CHECKING:
     from warp_mca.step.solver import Solver
+    from warp_mca.system.model import Model
     from warp_mca.system.state import State
 
 
@@ -35,13 +41,54 @@ def max_speed(solver: Solver, state: State, scene: int = 0) -> float:
 
 
 def rigid_bodies(solver: Solver, state: State, scene: int = 0) -> dict[str, dict[str, object]]:
-    """Mass, momentum and spin of each rigid body of a scene at the latest half step, by name; see `RigidState`."""
-    momentum, spin = state.rigid.momentum.numpy(), state.rigid.spin.numpy()
+    """What moves each rigid body of a scene, by name; see `RigidState`.
+
+    Mass [kg], inertia about the centre at the start [kg m^2]; mass centre at the end and its displacement [m], rotation
+    since the start as a vector [rad]; momentum [kg m/s] and spin [kg m^2/s] at the latest half step.
+    """
+    own = state.rigid
+    names = ("centre", "rotation", "momentum", "spin")
+    way, turned, momentum, spin = (np.asarray(getattr(own, name).numpy(), dtype=np.float64) for name in names)
     return {
-        body.name: {"mass": body.mass, "momentum": momentum[k].tolist(), "spin": spin[k].tolist()}
+        body.name: {
+            "mass": body.mass,
+            "inertia": body.inertia.tolist(),
+            "centre": (body.centre + way[k]).tolist(),
+            "displacement": way[k].tolist(),
+            "rotation": rotation_vector(turned[k]).tolist(),
+            "momentum": momentum[k].tolist(),
+            "spin": spin[k].tolist(),
+        }
         for k, body in enumerate(solver.model.rigid_bodies)
         if body.scene == scene
     }
+
+
+def flexible_bodies(model: Model, nodes: slice, state: State, names: Sequence[str]) -> dict[str, dict[str, object]]:
+    """What moves flexible bodies of a scene, by name: as `rigid_bodies`, and kinetic energy [J].
+
+    Args:
+        model: of that scene alone.
+        nodes: its nodes in the state.
+        state: at the end.
+        names: of the bodies.
+    """
+    u, v = (np.asarray(field.numpy()[nodes], dtype=np.float64) for field in (state.u, state.v))
+    starts = sorted([*model.node_start.values(), model.node_count])
+    found: dict[str, dict[str, object]] = {}
+    for name in names:
+        first = model.node_start[name]
+        own = slice(first, starts[starts.index(first) + 1])
+        m, x, w = model.mass[own], model.X[own] + u[own], v[own]
+        centre, momentum = m @ x / m.sum(), m @ w
+        found[name] = {
+            "mass": float(m.sum()),
+            "centre": centre.tolist(),
+            "momentum": momentum.tolist(),
+            "spin": (m @ np.cross(x - centre, w)).tolist(),
+            "kinetic": 0.5 * float(m @ (w**2).sum(axis=1)),
+        }
+    return found
 
 
 def joint_impulses(solver: Solver, state: State, scene: int = 0) -> dict[str, list[float]]:

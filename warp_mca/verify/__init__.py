@@ -41,6 +41,7 @@ FILES = (
     "rigid",
     "hinges",
     "rigid_bodies",
+    "robots",
     "body_joints",
     "joint_loops",
     "jointed_impacts",

@@ -36,7 +36,7 @@ def small_patch(c: Finished, patch: float) -> Iterator[Values]:
     by_nodes = {item.contact for k, item in enumerate(c.model.passes) if item.leads and c.ledger.nodes_at_peak(k)}
     for k, item, contact in listed_passes(c.scene, c.model):
         alone = item.leads or (item.sign > 0.0 and item.contact not in by_nodes)  # edges
-        if alone and (count := _few_nodes(c, k, patch)):
+        if alone and contact.stiffness is None and (count := _few_nodes(c, k, patch)):
             at_all = "less than three cells across" if is_curved_contact(c.model.X, item) else "a corner or an edge"
             yield dict(body=contact.slave.body, count=count, at_all=at_all)
 

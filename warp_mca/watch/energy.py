@@ -68,7 +68,8 @@ def soft_springs(c: Finished, most: float) -> Iterator[Values]:
     """Estimated loss of each contact's force peak by the energy in its springs then, see `spring_shares`."""
     curved = _curved(c.model)
     for k, ((name, springs), contact) in enumerate(zip(c.shares.items(), c.scene.contacts, strict=True)):
-        if springs is not None and springs.loss > most:
+        given = isinstance(contact, Contact) and contact.stiffness is not None
+        if springs is not None and springs.loss > most and not given:
             remedy = "raise the contact's penalty"
             if contact.penalty is None and k not in curved:
                 remedy = "give the contact penalty=10"

@@ -62,9 +62,11 @@ def spring_stiffness(
     that it suits any Poisson's ratio, and is stiffer where one of the surfaces is curved. Where both are flat, nodes
     share the stiffness of faces as they share their area, so that their pressure is uniform, and the springs of the
     two surfaces are in series. Two passes of one contact have half of it each. `flat` is what `is_flat` says; of
-    surfaces that change, what it said at the start.
+    surfaces that change, what it said at the start. `Contact.stiffness` is that of each node.
     """
     surfaces = [slave] if master is None else [slave, master]
+    if (k := contact.stiffness) is not None:
+        return [(np.full(len(faces.nodes), k), np.full(len(faces.node), k)) for faces in surfaces]
     half = 0.5 if contact.two_way else 1.0
     if contact.penalty is None and (is_flat(slave, master) if flat is None else flat):
         near = nearest_faces(contact, slave, master)[: len(surfaces)]

@@ -1,0 +1,149 @@
+"""Owns joints of a machine as freedoms of an impact: springs, dampers, limits, armature and what drives them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from warp_mca.base.arrays import Array
+from warp_mca.base.errors import bad_value
+from warp_mca.robots.machine import FRICTION_RATE
+from warp_mca.scene import Amplitude, Freedom, PositionServo
+
+if TYPE_CHECKING:
+    from warp_mca.robots.machine import Machine
+
+SOFT = 1e-9  # stiffness of the servo that stands for a constant torque with clamps, over that torque [1/rad, 1/m]
+
+
+def refuse_at_hand_off(machine: Machine) -> None:
+    """Refuse what swings but does not go through an impact.
+
+    Raises:
+        RequestError: the machine has something of it.
+    """
+    model, names, mj = machine.model, machine.names, machine.mj
+    for flag in ("SPRING", "DAMPER", "CLAMPCTRL"):
+        if int(model.opt.disableflags) & int(getattr(mj.mjtDisableBit, f"mjDSBL_{flag}")):
+            remedy = "an impact has springs, dampers and clamps of controls; take this flag out of the file's option"
+            raise bad_value("Robot: flag", f"{flag.lower()} disabled", remedy)
+    for k in range(1, model.nbody):
+        if model.body_gravcomp[k]:
+            raise bad_value(f"gravcomp of link {names.body(k)}", float(model.body_gravcomp[k]), "leave it out")
+    for k in range(model.njnt):
+        dofs = slice(int(model.jnt_dofadr[k]), int(model.jnt_dofadr[k]) + machine.rates_of(k))
+        several = dofs.stop - dofs.start > 1
+        free = int(model.jnt_type[k]) == int(mj.mjtJoint.mjJNT_FREE)
+        for what, value in (
+            ("stiffness", model.jnt_stiffness[k]),
+            ("armature", model.dof_armature[dofs].max()),
+            ("frictionloss", model.dof_frictionloss[dofs].max()),
+            ("damping", model.dof_damping[dofs].max() if free else 0.0),
+            ("range", model.jnt_limited[k]),
+        ):
+            if several and value:
+                remedy = "an impact carries it for hinges and slides; leave it out, or give hinges that meet"
+                raise bad_value(f"{what} of joint {names.joint(k)}", float(value), remedy)
+        if model.jnt_actfrclimited[k] and not several:
+            remedy = "an impact clamps each actuator alone; give the actuator a forcerange"
+            raise bad_value(f"actuatorfrcrange of joint {names.joint(k)}", tuple(model.jnt_actfrcrange[k]), remedy)
+
+
+class Drive(NamedTuple):
+    """Torque of an actuator on its joint: clamp(constant - kp q - kv q').
+
+    Attributes:
+        constant: [N m], [N].
+        kp, kv: [N m/rad], [N m s/rad]; [N/m], [N s/m].
+        limits: least and greatest, or None.
+    """
+
+    constant: float
+    kp: float
+    kv: float
+    limits: tuple[float, float] | None
+
+
+def freedom_of(machine: Machine, joint: int, qpos: Array) -> Freedom:
+    """The freedom of a joint of the file, at coordinates `qpos`.
+
+    Positions count from the pose in which axes are given, so that `ref` of the file is taken off.
+
+    Raises:
+        RequestError: its drives cannot be carried.
+    """
+    model, mj = machine.model, machine.mj
+    kind, at = int(model.jnt_type[joint]), tuple(float(v) for v in model.jnt_pos[joint])
+    dof, place = int(model.jnt_dofadr[joint]), int(model.jnt_qposadr[joint])
+    if kind == int(mj.mjtJoint.mjJNT_BALL):
+        return Freedom(kind="ball", at=at, damping=float(model.dof_damping[dof]))  # type: ignore[arg-type]
+    zero = float(model.qpos0[place])
+    motor, damping = _motor(machine, joint, zero)
+    found: dict[str, Any] = {}
+    if dof in (listed := machine.limited.tolist()):
+        k = listed.index(dof)
+        low, high = (float(v) - zero for v in model.jnt_range[joint])
+        found = {"limits": (low, high), "limit_stiffness": float(machine.limit_stiffness[k])}
+        found |= {"limit_damping": float(machine.limit_damping[k])}
+    return Freedom(
+        kind="slide" if kind == int(mj.mjtJoint.mjJNT_SLIDE) else "hinge",
+        axis=tuple(float(v) for v in model.jnt_axis[joint]),  # type: ignore[arg-type]
+        at=at,  # type: ignore[arg-type]
+        position=float(qpos[place]) - zero,
+        stiffness=float(model.jnt_stiffness[joint]),
+        rest=float(model.qpos_spring[place]) - zero,
+        damping=float(model.dof_damping[dof]) + damping,
+        friction=float(model.dof_frictionloss[dof]),
+        friction_rate=FRICTION_RATE,
+        armature=float(model.dof_armature[dof]),
+        motor=motor,
+        **found,
+    )
+
+
+def _motor(machine: Machine, joint: int, zero: float) -> tuple[Amplitude | PositionServo | None, float]:
+    """What drives a joint during an impact at held controls, and the damping that goes with it.
+
+    Raises:
+        RequestError: several actuators with clamps drive it, or one drives it away from rest.
+    """
+    model, name = machine.model, machine.names.joint(joint)
+    drives = [_drive(machine, k, zero) for k in range(model.nu) if int(model.actuator_trnid[k, 0]) == joint]
+    if machine.passive or not drives:
+        return None, 0.0
+    if len(drives) > 1 and any(drive.limits for drive in drives):
+        remedy = "actuators with a forcerange that share a joint are not carried; give the joint one"
+        raise bad_value("Robot: actuators of joint", name, remedy)
+    constant, kp, kv = (float(v) for v in np.sum([drive[:3] for drive in drives], axis=0))
+    limits = drives[0].limits
+    if kp < 0.0 or kv < 0.0:
+        remedy = "it drives the joint away from where it is; give a servo with kp and kv of 0 or above"
+        raise bad_value("Robot: actuators of joint", name, remedy)
+    if kp == 0.0 and limits is None:
+        return (Amplitude(times=(0.0,), values=(constant,)) if constant else None), kv
+    if kp == 0.0 and kv == 0.0 and limits is not None:
+        return Amplitude(times=(0.0,), values=(float(np.clip(constant, *limits)),)), 0.0
+    if kp == 0.0:
+        kp = SOFT * max(abs(constant), 1.0)
+    return PositionServo(kp=kp, kv=kv, target=constant / kp, limits=limits), 0.0
+
+
+def _drive(machine: Machine, k: int, zero: float) -> Drive:
+    """The torque of actuator k on its joint: gear (gain ctrl + bias), each affine in gear q and gear q'."""
+    model, mj = machine.model, machine.mj
+    gear, ctrl = float(model.actuator_gear[k, 0]), float(machine.ctrl[k])
+    if model.actuator_ctrllimited[k]:
+        ctrl = float(np.clip(ctrl, *model.actuator_ctrlrange[k]))
+    gain, bias = np.array(model.actuator_gainprm[k, :3]), np.zeros(3)
+    if int(model.actuator_gaintype[k]) == int(mj.mjtGain.mjGAIN_FIXED):
+        gain[1:] = 0.0
+    if int(model.actuator_biastype[k]) == int(mj.mjtBias.mjBIAS_AFFINE):
+        bias = np.array(model.actuator_biasprm[k, :3])
+    b0, b1, b2 = gain * ctrl + bias
+    limits = None
+    if model.actuator_forcelimited[k]:
+        low, high = sorted(gear * float(v) for v in model.actuator_forcerange[k])
+        limits = (low, high)
+    constant, kp, kv = gear * b0, -(gear**2) * b1, -(gear**2) * b2
+    return Drive(constant - kp * zero, kp, kv, limits)

@@ -1,0 +1,208 @@
+"""Owns the reading of a robot's file by MuJoCo: what a machine may hold, and how it is compiled for a swing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warp_mca.base.errors import bad_value
+
+if TYPE_CHECKING:
+    from warp_mca.robots.masses import MassProperties
+    from warp_mca.robots.robot import Robot
+
+SUFFIXES = (".xml", ".mjcf", ".urdf")
+EXACT = 1e-12  # of MuJoCo's distances of convex geoms [m]
+
+
+def mujoco(what: str, value: object) -> Any:
+    """The module `mujoco`, for a field that needs it.
+
+    Raises:
+        RequestError: it is not installed.
+    """
+    try:
+        import mujoco as found
+    except ImportError as error:
+        raise bad_value(what, value, 'MuJoCo reads it; install it with pip install "warp_mca[robots]"') from error
+    return found
+
+
+def compiled(robot: Robot) -> tuple[Any, Any]:
+    """The `MjSpec` and `MjModel` of a robot.
+
+    Fixed links are bodies of their own; contact, limits and dry friction are left to us.
+
+    Raises:
+        RequestError: the file cannot be read, or holds what a machine does not carry.
+    """
+    mj = mujoco("Robot.file", robot.path)
+    spec = _parsed(mj, robot)
+    spec.compiler.fusestatic = False
+    spec.option.jacobian = mj.mjtJacobian.mjJAC_DENSE
+    spec.option.ccd_tolerance, spec.option.ccd_iterations = EXACT, 500
+    for flag in ("CONTACT", "LIMIT", "FRICTIONLOSS", "SENSOR", "ISLAND"):
+        spec.option.disableflags |= int(getattr(mj.mjtDisableBit, f"mjDSBL_{flag}"))
+    spec.option.enableflags &= ~int(mj.mjtEnableBit.mjENBL_SLEEP)
+    _add_servos(mj, spec, robot)
+    model = _compiled(robot, spec)
+    for sentence in _refused(mj, model):
+        raise bad_value("Robot.file", robot.path, sentence)
+    return spec, model
+
+
+def with_masses(mj: Any, robot: Robot, spec: Any, masses: Mapping[str, MassProperties]) -> Any:
+    """The model with other masses, centres and inertias of some links, by name.
+
+    Raises:
+        RequestError: MuJoCo refuses it.
+    """
+    for name, own in masses.items():
+        moments, axes = np.linalg.eigh(own.inertia)
+        axes[:, 2] *= np.linalg.det(axes)
+        turned = np.zeros(4)
+        mj.mju_mat2Quat(turned, axes.reshape(-1))
+        body = spec.body(name)
+        body.explicitinertial, body.mass, body.ipos = True, own.mass, own.centre
+        body.iquat, body.inertia = turned, moments
+    return _compiled(robot, spec)
+
+
+def _compiled(robot: Robot, spec: Any) -> Any:
+    try:
+        return spec.compile()
+    except (ValueError, RuntimeError) as error:
+        raise bad_value("Robot.file", robot.path, f"MuJoCo says: {_words(error)}; correct the file") from error
+
+
+def _parsed(mj: Any, robot: Robot) -> Any:
+    path = Path(robot.path)
+    if path.suffix.lower() not in SUFFIXES:
+        raise bad_value("Robot.file", robot.path, "give an MJCF file (.xml) or a URDF file (.urdf)")
+    if not path.is_file():
+        raise bad_value("Robot.file", robot.path, "there is no such file")
+    try:
+        return mj.MjSpec.from_file(str(path))
+    except (ValueError, RuntimeError) as error:
+        raise bad_value("Robot.file", robot.path, f"MuJoCo says: {_words(error)}; correct the file") from error
+
+
+def _words(error: Exception) -> str:
+    return " ".join(str(error).split()).rstrip(".;")
+
+
+def _add_servos(mj: Any, spec: Any, robot: Robot) -> None:
+    """Servos that are given beside the file, as position actuators of their joints.
+
+    Raises:
+        RequestError: a joint is not in the file or has an actuator there.
+    """
+    joints = [joint.name for joint in spec.joints]
+    taken = {actuator.target for actuator in spec.actuators}
+    for name, servo in robot.servos.items():
+        if name not in joints:
+            raise bad_value("Robot.servos", name, f"the file's joints are {', '.join(filter(None, joints))}")
+        if name in taken:
+            raise bad_value("Robot.servos", name, "the file has an actuator of this joint; leave one of them out")
+        added = spec.add_actuator(name=name, target=name, trntype=mj.mjtTrn.mjTRN_JOINT)
+        added.gainprm[0], added.biasprm[1], added.biasprm[2] = servo.kp, -servo.kp, -servo.kv
+        added.biastype = mj.mjtBias.mjBIAS_AFFINE
+        added.ctrllimited = False
+        if servo.limits is not None:
+            added.forcelimited, added.forcerange = True, list(servo.limits)
+
+
+def _refused(mj: Any, model: Any) -> Iterator[str]:
+    """What a machine does not carry, each with a remedy."""
+    counts = {
+        "tendons": model.ntendon,
+        "flexes": model.nflex,
+        "mocap bodies": model.nmocap,
+        "plugins": model.nplugin,
+        "height fields": model.nhfield,
+        "activations of actuators": model.na,
+    }
+    for what, count in counts.items():
+        if count:
+            yield f"it has {what} ({count}), which a machine does not carry; take them out"
+    names = Names(mj, model)
+    for k in range(model.nu):
+        yield from (f"actuator {names.actuator(k)}: {text}" for text in _refused_drive(mj, model, k))
+    for k in range(model.njnt):
+        for what in ("jnt_stiffnesspoly", "jnt_springyield"):
+            if getattr(model, what, None) is not None and getattr(model, what)[k].any():
+                yield f"joint {names.joint(k)} has a spring that is not linear; give it a stiffness alone"
+    if getattr(model, "dof_dampingpoly", None) is not None and model.dof_dampingpoly.any():
+        yield "it has damping that is not linear in the rate; give joints a damping alone"
+    kinds = (mj.mjtEq.mjEQ_CONNECT, mj.mjtEq.mjEQ_WELD, mj.mjtEq.mjEQ_JOINT)
+    for k in range(model.neq):
+        if model.eq_active0[k] and model.eq_type[k] not in [int(kind) for kind in kinds]:
+            yield f"equality {names.equality(k)} is none of connect, weld and joint; take it out"
+    if model.opt.disableactuator:
+        yield "it switches groups of actuators off (actuatorgroupdisable of option); take these actuators out"
+    if model.opt.density or model.opt.viscosity or model.opt.wind.any():
+        yield "it moves in a fluid (density, viscosity or wind of option), which acts on no machine here; take it out"
+
+
+def _refused_drive(mj: Any, model: Any, k: int) -> Iterator[str]:
+    joints = (int(mj.mjtTrn.mjTRN_JOINT), int(mj.mjtTrn.mjTRN_JOINTINPARENT))
+    scalar = (int(mj.mjtJoint.mjJNT_HINGE), int(mj.mjtJoint.mjJNT_SLIDE))
+    if model.actuator_trntype[k] not in joints or model.jnt_type[model.actuator_trnid[k, 0]] not in scalar:
+        yield "it drives no hinge or slide; drive a joint"
+    elif model.actuator_dyntype[k] != int(mj.mjtDyn.mjDYN_NONE):
+        yield "it has dynamics of its own; give a motor, position or velocity actuator without a time constant"
+    elif model.actuator_gaintype[k] not in (int(mj.mjtGain.mjGAIN_FIXED), int(mj.mjtGain.mjGAIN_AFFINE)):
+        yield "its gain is neither fixed nor affine; give a motor, position or velocity actuator"
+    elif model.actuator_biastype[k] not in (int(mj.mjtBias.mjBIAS_NONE), int(mj.mjtBias.mjBIAS_AFFINE)):
+        yield "its bias is neither none nor affine; give a motor, position or velocity actuator"
+    for what in ("actuator_armature", "actuator_damping", "actuator_delay"):
+        if getattr(model, what, None) is not None and getattr(model, what)[k].any():
+            yield f"it has {what.removeprefix('actuator_')} of its own; give that to the joint, or leave it out"
+
+
+class Names:
+    """Names of what a model holds; where the file gives none, those of the body with a number."""
+
+    def __init__(self, mj: Any, model: Any) -> None:
+        self._mj, self._model = mj, model
+
+    def body(self, k: int) -> str:
+        """Of body k; "world" is 0."""
+        return self._name("BODY", k) or f"body{k}"
+
+    def joint(self, k: int) -> str:
+        """Of joint k."""
+        return self._name("JOINT", k) or f"{self.body(int(self._model.jnt_bodyid[k]))}_joint{k}"
+
+    def geom(self, k: int) -> str:
+        """Of geom k."""
+        return self._name("GEOM", k) or f"{self.body(int(self._model.geom_bodyid[k]))}_geom{k}"
+
+    def actuator(self, k: int) -> str:
+        """Of actuator k."""
+        return self._name("ACTUATOR", k) or f"actuator{k}"
+
+    def equality(self, k: int) -> str:
+        """Of equality constraint k."""
+        return self._name("EQUALITY", k) or f"equality{k}"
+
+    @property
+    def bodies(self) -> list[str]:
+        """Of all bodies but the world."""
+        return [self.body(k) for k in range(1, self._model.nbody)]
+
+    @property
+    def joints(self) -> list[str]:
+        """Of all joints."""
+        return [self.joint(k) for k in range(self._model.njnt)]
+
+    @property
+    def actuators(self) -> list[str]:
+        """Of all actuators."""
+        return [self.actuator(k) for k in range(self._model.nu)]
+
+    def _name(self, kind: str, k: int) -> str | None:
+        return self._mj.mj_id2name(self._model, int(getattr(self._mj.mjtObj, f"mjOBJ_{kind}")), k)

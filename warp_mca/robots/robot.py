@@ -1,0 +1,284 @@
+"""Owns `Robot`: a machine in three dimensions, read from an MJCF or URDF file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from types import NoneType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warp_mca.base import validate
+from warp_mca.base.arrays import Array
+from warp_mca.base.errors import bad_value
+from warp_mca.base.rotation import rotation_matrix
+from warp_mca.geometry.mesh import Mesh
+from warp_mca.scene import Body, Fixed, ImpactPhase, PositionServo, RigidPlane, Scene
+from warp_mca.scene.materials import Material
+
+if TYPE_CHECKING:
+    from warp_mca.results.result import Result
+    from warp_mca.robots.handback import HandBack
+    from warp_mca.robots.machine import Machine
+    from warp_mca.robots.masses import MassProperties
+    from warp_mca.robots.skins import Skin
+    from warp_mca.robots.swing import RobotSwing
+    from warp_mca.robots.touching import Pair
+
+Values = Sequence[float] | Mapping[str, float | Sequence[float]]
+Controller = Callable[[float, Array, Array], Sequence[float]]
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A machine in three dimensions from an MJCF or URDF file, which MuJoCo reads (extra `robots`).
+
+    Trees of links and loops of equality constraints, with all joint types, limits, springs, damping, dry friction,
+    armature, motors and servos. Fixed links of a URDF stay links. Tendons, flexes, muscles, plugins, mocap bodies and
+    height fields are refused by name.
+
+    Attributes:
+        path: of the file, with suffix .xml, .mjcf or .urdf.
+        flexible: recipes or meshes by the name of the link that is to be made of them, in the link's frame; or Bodies,
+            whose position and rotation are those in the link's frame.
+        material: of the recipes in `flexible`.
+        keyframe: name of the file's keyframe to start from.
+        qpos: start in place of the file's: all of MuJoCo's coordinates, or some by the name of their joint [m, rad].
+        qvel: likewise rates [m/s, rad/s].
+        ctrl: likewise controls, by the name of the actuator.
+        servos: by joint, where the file has no drive, as a URDF.
+        controller: gives the controls at time t [s], coordinates and rates: controller(t, qpos, qvel). It is called at
+            each period, and its controls are held in between.
+        period: of the controller [s].
+        clock: time at the start, with which the controller is called first [s].
+        mounts: node set by which each flexible link is held: by its parent, or by what rides on it, see `strike`.
+            Where several links hold it: a dict of node sets by the name of the other link.
+        against: planes and bodies beside the machine that it may touch.
+        touch: names of links or geoms: pairs without one of these are not looked at. () for all that the file lets
+            collide, and all that may meet `against`.
+    """
+
+    path: str | os.PathLike[str]
+    flexible: Mapping[str, Any] = field(default_factory=dict)
+    material: Material | None = None
+    keyframe: str | None = None
+    qpos: Values | None = None
+    qvel: Values | None = None
+    ctrl: Values | None = None
+    servos: Mapping[str, PositionServo] = field(default_factory=dict)
+    controller: Controller | None = None
+    period: float | None = None
+    clock: float = 0.0
+    mounts: Mapping[str, Any] = field(default_factory=dict)
+    against: tuple[RigidPlane | Body, ...] = ()
+    touch: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        validate.kinds("Robot", (str, os.PathLike), "give the path of a file", path=self.path)
+        object.__setattr__(self, "path", os.fspath(self.path))
+        validate.kinds("Robot", Mapping, "give a Body for each link by its name", flexible=self.flexible)
+        validate.kinds("Robot", Mapping, "give a PositionServo for each joint by its name", servos=self.servos)
+        for name, servo in self.servos.items():
+            validate.kind_of(f"Robot.servos[{name!r}]", servo, PositionServo, "give a PositionServo")
+            if not validate.is_number(servo.target):
+                raise bad_value(f"Robot.servos[{name!r}].target", "Amplitude", "give a number, or a controller")
+        object.__setattr__(self, "flexible", {name: self._body(name, item) for name, item in self.flexible.items()})
+        validate.kinds("Robot", (str, NoneType), "give the name of a keyframe", keyframe=self.keyframe)
+        validate.members("Robot", (RigidPlane, Body), against=self.against)
+        validate.kinds("Robot", (tuple, list), "give a tuple of names", touch=self.touch)
+        validate.texts("Robot", **{f"touch[{k}]": name for k, name in enumerate(self.touch)})
+        validate.unique("Robot.against", [body.name for body in self.against if isinstance(body, Body)], "body")
+        if self.controller is not None and not callable(self.controller):
+            raise bad_value("Robot.controller", validate.brief(self.controller), "give a function of (t, qpos, qvel)")
+        if (self.controller is None) != (self.period is None):
+            raise bad_value("Robot.period", self.period, "give a controller and the period at which it is called")
+        if self.period is not None:
+            validate.times("Robot", period=self.period)
+        validate.finite("Robot", clock=self.clock)
+
+    def _body(self, name: str, item: Any) -> Body:
+        """The body that a flexible link is made of, by the link's name.
+
+        Raises:
+            RequestError: it is none, is rigid, or moves by itself.
+        """
+        owner = f"Robot.flexible[{name!r}]"
+        validate.texts("Robot", flexible=name)
+        if not isinstance(item, Body):
+            if self.material is None:
+                raise bad_value("Robot.material", None, f"give the material of {owner}, or a Body there")
+            return Body(name=name, geometry=item, material=self.material)
+        for key in ("velocity", "angular_velocity"):
+            if any(getattr(item, key)):
+                raise bad_value(f"{owner}.{key}", getattr(item, key), "a link moves as the machine does; leave it 0")
+        if item.rigid:
+            raise bad_value(f"{owner}.rigid", True, "links that are not named in flexible are rigid; leave it out")
+        return replace(item, name=name)
+
+    def swing(self, *, t_max: float = 5.0, t_end: float | None = None) -> RobotSwing:
+        """Swing from the start until the machine touches something, or to a time.
+
+        Steps are those of DOP853 under error control, whatever the file's timestep. A limit is a stiff spring with
+        critical damping; loops are kept closed exactly. The touch is that of the surfaces that contact uses: skins of
+        flexible links and bodies, and geoms. It is located to 1e-9 s between spheres, capsules, boxes, cylinders and
+        planes; other pairs meet where a node of the one meets a face of the other, edges that cross are not seen.
+
+        Args:
+            t_max: give up when nothing was touched by then [s].
+            t_end: end then in place of t_max, touch or not, and do not look for touches [s].
+
+        Raises:
+            RequestError: the file cannot be read, holds what a machine does not carry, or MuJoCo is not installed;
+                the start is none of it; surfaces overlap at the start; nothing touches by t_max.
+        """
+        from warp_mca.robots.swing import swing
+
+        validate.times("Robot.swing", t_max=t_max)
+        if t_end is not None:
+            validate.times("Robot.swing", t_end=t_end)
+            return swing(self, self._machine(), (), t_end, stops=False)
+        machine = self._machine()
+        pairs = self._pairs(machine)
+        if not pairs:
+            remedy = "nothing may touch: name in against what stands beside the machine, or give a t_end"
+            raise bad_value("Robot.against", (), remedy)
+        found = swing(self, machine, pairs, t_max)
+        if found.touch is None:
+            gap, t = found.closest
+            remedy = f"nothing touches by t_max = {t_max:g} s, closest at t = {t:.6g} s; start nearer or swing longer"
+            raise bad_value("closest gap of the machine [m]", gap, remedy)
+        return found
+
+    def strike(
+        self,
+        *,
+        impact: ImpactPhase,
+        stiffness: float = 1e8,
+        mu: float = 0.0,
+        swing: RobotSwing | None = None,
+        fixed: tuple[Fixed, ...] = (),
+        faces: int = 24,
+        name: str = "strike",
+    ) -> Scene:
+        """The machine at its first touch as a scene, to run, to save or to change: an impact by finite elements.
+
+        Flexible links get their meshes, all others are rigid bodies with the file's mass, centre and inertia. Joints
+        are Articulations with springs, dampers, friction, armature, limits and drives, which go on acting at the
+        controls that are held. Of the file's geoms those are meshed that may touch within the impact; a round one has a
+        node where it touches first. Geoms of the world are held. What the file's link has beyond
+        the mass of its mesh rides on it as a rigid body, "NAME rest", to which it is mounted; where they differ by no
+        more than 2 %, the link swings with the mass of its mesh.
+
+        Args:
+            impact: the phase.
+            stiffness: of contact between rigid surfaces, of each node [N/m]; others have the default of `Contact`.
+            mu: coefficient of friction of all contacts [-]; that of the file is not read.
+            swing: how it came there; None: its swing to the first touch.
+            faces: around a round geom [-], whose middles lie 0.0086 of its radius inside at 24. Where round geoms slide
+                along each other take more; the step falls.
+            fixed: nodes of bodies beside the machine that are held.
+            name: of the scene.
+
+        Raises:
+            RequestError: as in `swing`; the machine has something that an impact does not carry; a controller would be
+                called during the impact; a mesh has more mass than its link, or a flexible link is held nowhere.
+        """
+        from warp_mca.robots.handoff import HandOff
+
+        validate.kinds("Robot.strike", ImpactPhase, "give an ImpactPhase", impact=impact)
+        validate.positive("Robot.strike", stiffness=stiffness)
+        validate.counts("Robot.strike", faces=faces)
+        if faces % 4 or faces < 8:
+            raise bad_value("Robot.strike.faces", faces, "give a multiple of 4, 8 at least")
+        if self.period is not None and self.period < impact.duration:
+            remedy = f"controls are held during an impact, which lasts {impact.duration:g} s; give no shorter one"
+            raise bad_value("Robot.period", self.period, remedy)
+        found = self.swing() if swing is None else swing
+        machine = self._machine()
+        scene = HandOff(self, machine, found).scene(impact, self._pairs(machine), (stiffness, mu, faces), name)
+        return replace(scene, fixed=(*scene.fixed, *fixed))
+
+    def after(self, swing: RobotSwing, scene: Scene, result: Result) -> HandBack:
+        """The machine after an impact, to swing on.
+
+        The motion at the end of the impact goes to the joints so that generalised momenta are kept; what vibrates is
+        lost, and stated. Flexible links get their shape back, so they must not have yielded.
+
+        Args:
+            swing: of this machine, at whose end it was handed over.
+            scene: that `strike` made of it.
+            result: of the run of that scene.
+
+        Raises:
+            RequestError: the result is not one of the scene, a flexible link yielded, or a flexible body beside moves.
+        """
+        from warp_mca.robots.handback import hand_back
+
+        return hand_back(self, swing, scene, result)
+
+    def mount(self, link: str, other: str | None) -> str:
+        """Node set by which a flexible link is held to another link, or to what rides on it.
+
+        Raises:
+            RequestError: none was given.
+        """
+        given = self.mounts.get(link)
+        found = given.get(other) if isinstance(given, Mapping) else given
+        if not isinstance(found, str):
+            held = "what rides on it" if other is None else other
+            sets = ", ".join(sorted(self.meshes[link].node_sets))
+            remedy = f"name the node set that holds it to {held}; its mesh has {sets}"
+            raise bad_value(f"Robot.mounts[{link!r}]", given, remedy)
+        return found
+
+    def _machine(self) -> Machine:
+        from warp_mca.robots.machine import Machine
+
+        return Machine(self)
+
+    def _pairs(self, machine: Machine) -> list[Pair]:
+        from warp_mca.robots.geoms import geom_side
+        from warp_mca.robots.reading import mujoco
+        from warp_mca.robots.touching import pairs_of
+
+        mj = mujoco("Robot.file", self.path)
+        geoms = lambda side: geom_side(mj, machine, side)  # noqa: E731
+        return pairs_of(mj, self, machine, self._skins, geoms)
+
+    @cached_property
+    def meshes(self) -> dict[str, Mesh]:
+        """Meshes of the flexible links, in the links' frames, and of the bodies beside, by name.
+
+        Raises:
+            RequestError: one cannot be meshed.
+        """
+        from warp_mca.phases.meshing import mesh
+
+        bodies = (*self.flexible.values(), *(item for item in self.against if isinstance(item, Body)))
+        if not bodies:
+            return {}
+        found = mesh(Scene(name="robot", bodies=bodies, impact=ImpactPhase(duration=1e-3)))
+        for name, body in self.flexible.items():
+            turned = found[name].points @ rotation_matrix(body.rotation).T
+            found[name] = replace(found[name], points=np.array(body.position) + turned)
+        return found
+
+    @cached_property
+    def mesh_masses(self) -> dict[str, MassProperties]:
+        """Mass properties of the meshes of flexible links, in the links' frames."""
+        from warp_mca.physics.elements.cells import nodal_masses
+        from warp_mca.robots.masses import of_nodes
+
+        bodies = tuple(self.flexible.values())
+        scene = Scene(name="robot", bodies=bodies, impact=ImpactPhase(duration=1e-3)) if bodies else None
+        masses = nodal_masses(scene, self.meshes) if scene else {}
+        return {name: of_nodes(self.meshes[name].points, masses[name]) for name in self.flexible}
+
+    @cached_property
+    def _skins(self) -> dict[str, Skin]:
+        from warp_mca.robots.skins import Skin
+
+        return {name: Skin.of(mesh) for name, mesh in self.meshes.items()}
