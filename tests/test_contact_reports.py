@@ -14,8 +14,9 @@ from watched import of_contacts
 import warp_mca as mca
 from warp_mca.accuracy.figures import why_unsure
 from warp_mca.model.build import build_model
-from warp_mca.results.contact_history import ContactHistory, contact_names
+from warp_mca.results.contact_history import ContactHistory
 from warp_mca.results.force_history import faint_share, grazing_share
+from warp_mca.scene.contacts import contact_names
 from warp_mca.watch.contacts import symmetry_of
 
 STIFF = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)

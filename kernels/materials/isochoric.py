@@ -12,7 +12,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
-from warp_mca.kernels.materials.kinematics import Kinematics, kinematics
+from warp_mca.kernels.materials.kinematics import Kinematics, cofactor_function, kinematics
 from warp_mca.kernels.materials.laws import law_functions
 
 wp.set_module_options({"enable_backward": False})
@@ -57,7 +57,7 @@ def law_kinematics(precision: str, law_name: str, finite: bool) -> Kinematics:
 def _isochoric(precision: str, logarithmic: Kinematics) -> Kinematics:
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
-    dilatation, inverse_root = logarithmic.dilatation, root_function(precision)
+    dilatation, inverse_root, cofactor = logarithmic.dilatation, root_function(precision), cofactor_function(precision)
 
     @wp.func
     def isochoric_strain(H: mat33):
@@ -74,17 +74,6 @@ def _isochoric(precision: str, logarithmic: Kinematics) -> Kinematics:
         for i in range(3):
             E[i, i] = E[i, i] + R(0.5) * j
         return E, mat33(), vec3()
-
-    @wp.func
-    def cofactor(H: mat33):
-        F = wp.identity(n=3, dtype=R) + H
-        r0 = vec3(F[0, 0], F[0, 1], F[0, 2])
-        r1 = vec3(F[1, 0], F[1, 1], F[1, 2])
-        r2 = vec3(F[2, 0], F[2, 1], F[2, 2])
-        k0 = wp.cross(r1, r2)
-        k1 = wp.cross(r2, r0)
-        k2 = wp.cross(r0, r1)
-        return mat33(k0[0], k0[1], k0[2], k1[0], k1[1], k1[2], k2[0], k2[1], k2[2]), wp.dot(r0, k0)
 
     @wp.func
     def isochoric_nominal(H: mat33, S: mat33, N: mat33, d: vec3, pressure: R):

@@ -43,6 +43,12 @@ def eigen_function(precision: str) -> Any:
         return cosine, cosine * tangent, tangent
 
     @wp.func
+    def rotate(p: R, q: R, pq: R, pr: R, qr: R, n_p: vec3, n_q: vec3):
+        """Entries pp, qq, pr, qr and both directions after the rotation that makes pq zero; r is the third axis."""
+        c, s, t = jacobi_rotation(p, q, pq)
+        return p - t * pq, q + t * pq, c * pr - s * qr, s * pr + c * qr, c * n_p - s * n_q, s * n_p + c * n_q
+
+    @wp.func
     def jacobi_eigen(C: mat33):
         xx = C[0, 0]
         yy = C[1, 1]
@@ -54,36 +60,12 @@ def eigen_function(precision: str) -> Any:
         n1 = vec3(R(0.0), R(1.0), R(0.0))
         n2 = vec3(R(0.0), R(0.0), R(1.0))
         for _ in range(wp.static(SWEEPS)):
-            c, s, t = jacobi_rotation(xx, yy, xy)
-            xx = xx - t * xy
-            yy = yy + t * xy
+            xx, yy, xz, yz, n0, n1 = rotate(xx, yy, xy, xz, yz, n0, n1)
             xy = R(0.0)
-            a = xz
-            xz = c * a - s * yz
-            yz = s * a + c * yz
-            n = n0
-            n0 = c * n - s * n1
-            n1 = s * n + c * n1
-            c, s, t = jacobi_rotation(xx, zz, xz)
-            xx = xx - t * xz
-            zz = zz + t * xz
+            xx, zz, xy, yz, n0, n2 = rotate(xx, zz, xz, xy, yz, n0, n2)
             xz = R(0.0)
-            a = xy
-            xy = c * a - s * yz
-            yz = s * a + c * yz
-            n = n0
-            n0 = c * n - s * n2
-            n2 = s * n + c * n2
-            c, s, t = jacobi_rotation(yy, zz, yz)
-            yy = yy - t * yz
-            zz = zz + t * yz
+            yy, zz, xy, xz, n1, n2 = rotate(yy, zz, yz, xy, xz, n1, n2)
             yz = R(0.0)
-            a = xy
-            xy = c * a - s * xz
-            xz = s * a + c * xz
-            n = n1
-            n1 = c * n - s * n2
-            n2 = s * n + c * n2
         return wp.matrix_from_cols(n0, n1, n2), vec3(xx, yy, zz)
 
     return jacobi_eigen
@@ -119,6 +101,26 @@ class Kinematics:
 def kinematics(precision: str, finite: bool) -> Kinematics:
     """The functions of logarithmic strain where `finite`, else of small strain."""
     return _logarithmic(precision) if finite else _small(precision)
+
+
+@cache
+def cofactor_function(precision: str) -> Any:
+    """The function H -> (J F^-T, J) of F = I + H."""
+    t = scalars(precision)
+    R, vec3, mat33 = t.real, t.vec3, t.mat33
+
+    @wp.func
+    def cofactor(H: mat33):
+        F = wp.identity(n=3, dtype=R) + H
+        r0 = vec3(F[0, 0], F[0, 1], F[0, 2])
+        r1 = vec3(F[1, 0], F[1, 1], F[1, 2])
+        r2 = vec3(F[2, 0], F[2, 1], F[2, 2])
+        k0 = wp.cross(r1, r2)
+        k1 = wp.cross(r2, r0)
+        k2 = wp.cross(r0, r1)
+        return mat33(k0[0], k0[1], k0[2], k1[0], k1[1], k1[2], k2[0], k2[1], k2[2]), wp.dot(r0, k0)
+
+    return cofactor
 
 
 def _small(precision: str) -> Kinematics:
@@ -176,7 +178,7 @@ def _small(precision: str) -> Kinematics:
 def _logarithmic(precision: str) -> Kinematics:
     t = scalars(precision)
     R, vec3, mat33 = t.real, t.vec3, t.mat33
-    principal, natural_log = eigen_function(precision), log_function(precision)
+    principal, natural_log, cofactor = eigen_function(precision), log_function(precision), cofactor_function(precision)
 
     @wp.func
     def log_over(x: R):
@@ -219,19 +221,9 @@ def _logarithmic(precision: str) -> Kinematics:
         return P + H * P
 
     @wp.func
-    def log_cofactor(H: mat33):
-        F = wp.identity(n=3, dtype=R) + H
-        r0 = vec3(F[0, 0], F[0, 1], F[0, 2])
-        r1 = vec3(F[1, 0], F[1, 1], F[1, 2])
-        r2 = vec3(F[2, 0], F[2, 1], F[2, 2])
-        k0 = wp.cross(r1, r2)
-        k1 = wp.cross(r2, r0)
-        k2 = wp.cross(r0, r1)
-        return mat33(k0[0], k0[1], k0[2], k1[0], k1[1], k1[2], k2[0], k2[1], k2[2])
-
-    @wp.func
     def log_nominal(H: mat33, S: mat33, N: mat33, d: vec3, pressure: R):
-        return log_deviatoric(H, S, N, d) + pressure * log_cofactor(H)
+        k, _J = cofactor(H)
+        return log_deviatoric(H, S, N, d) + pressure * k
 
     @wp.func
     def log_pressure(K: R, theta: R):

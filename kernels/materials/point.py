@@ -41,145 +41,9 @@ class MaterialPoint:
 
 
 @cache
-def material_point(precision: str, law_name: str, finite: bool, points: int = 0) -> MaterialPoint:
-    """The point of a law, elastic where that is "", with the strain of `law_kinematics`; `points` as above.
-
-    Raises:
-        RequestError: a hyperelastic law is to take small strain.
-    """
-    functions = law_functions(law_name, precision)
-    if functions.general:
-        return _general_point(precision, law_name, finite, points)
-    t = scalars(precision)
-    R, mat33 = t.real, t.mat33
-    if functions.hyperelastic and not finite:
-        raise bad_value("Body.kinematics", "corotational", "a hyperelastic law needs kinematics='finite'")
-    if functions.hyperelastic or functions.viscous:
-        return _elastic_point(precision, law_name, points)
-    plastic, rated = bool(law_name), functions.rated
-    flow_at, rated_at = (make(precision, law_name, points) for make in (flow_function, rated_function))
-    read_history, _ = history_functions(precision, law_name, points)
-    plastic_strain, _ = plastic_strain_functions(precision, law_name)
-    read_parameters, plastic_energy, plastic_work = (
-        functions.parameters,
-        functions.plastic_energy,
-        functions.plastic_work,
-    )
-
-    @wp.func
-    def update(
-        strain: mat33,
-        theta: R,
-        G: R,
-        g: int,
-        e: int,
-        m: int,
-        flag: int,
-        law: wp.array2d(dtype=R),
-        dt: R,
-        history_out: wp.array2d(dtype=R),
-    ):
-        S = R(2.0) * G * strain
-        dp = R(0.0)
-        if wp.static(rated):
-            S, dp = rated_at(S, G, g, e, m, flag, law, dt, history_out)
-        elif wp.static(plastic):
-            S, dp = flow_at(S, G, g, e, m, flag, law, history_out)
-        return S, R(0.0), dp
-
-    @wp.func
-    def read(
-        strain: mat33,
-        theta: R,
-        G: R,
-        g: int,
-        e: int,
-        m: int,
-        flag: int,
-        law: wp.array2d(dtype=R),
-        history: wp.array2d(dtype=R),
-    ):
-        eps_p = mat33()
-        p = R(0.0)
-        dissipated = R(0.0)
-        if wp.static(plastic):
-            if flag != 0:
-                h = read_history(history, g, e)
-                eps_p, p = plastic_strain(h)
-                if wp.static(rated):
-                    dissipated = plastic_work(h, read_parameters(law, m, R(1.0)))
-                else:
-                    dissipated = plastic_energy(eps_p, p, read_parameters(law, m, R(1.0)))
-        stored = G * wp.ddot(strain - eps_p, strain - eps_p)
-        return R(2.0) * G * (strain - eps_p), R(0.0), p, stored, dissipated
-
-    return MaterialPoint(functions.size, False, update, read)
-
-
-def _elastic_point(precision: str, law_name: str, points: int) -> MaterialPoint:
-    """Of a law that gives the deviatoric stress of an energy, with a history where it is viscous."""
-    t = scalars(precision)
-    R, mat33 = t.real, t.mat33
-    functions = law_functions(law_name, precision)
-    viscous, read_parameters = functions.viscous, functions.parameters
-    mandel, stored_energy = functions.mandel, functions.stored
-    law_stress, law_energies = functions.deviatoric, functions.energies
-    read_history, write_history = history_functions(precision, law_name, points)
-
-    @wp.func
-    def update(
-        strain: mat33,
-        theta: R,
-        G: R,
-        g: int,
-        e: int,
-        m: int,
-        flag: int,
-        law: wp.array2d(dtype=R),
-        dt: R,
-        history_out: wp.array2d(dtype=R),
-    ):
-        c = read_parameters(law, m, R(1.0))
-        if wp.static(viscous):
-            S, h = law_stress(strain, read_history(history_out, g, e), dt, c)
-            write_history(history_out, g, e, h)
-        else:
-            S = mandel(strain, c)
-        return S, R(0.0), R(0.0)
-
-    @wp.func
-    def read(
-        strain: mat33,
-        theta: R,
-        G: R,
-        g: int,
-        e: int,
-        m: int,
-        flag: int,
-        law: wp.array2d(dtype=R),
-        history: wp.array2d(dtype=R),
-    ):
-        c = read_parameters(law, m, R(1.0))
-        dissipated = R(0.0)
-        if wp.static(viscous):
-            h = read_history(history, g, e)
-            S, _h = law_stress(strain, h, R(0.0), c)
-            stored, dissipated = law_energies(strain, h, c)
-        else:
-            S = mandel(strain, c)
-            stored = stored_energy(strain, c)
-        return S, R(0.0), R(0.0), stored, dissipated
-
-    return MaterialPoint(functions.size, False, update, read)
-
-
-def _general_point(precision: str, law_name: str, finite: bool, points: int) -> MaterialPoint:
-    t = scalars(precision)
-    R, mat33 = t.real, t.mat33
-    functions = law_functions(law_name, precision)
-    read_parameters, law_stress, law_energies = functions.parameters, functions.stress, functions.energies
-    row, vector = functions.plastic_row, wp.types.vector(max(1, functions.size), R)
-    read_history, write_history = history_functions(precision, law_name, points)
+def whole_functions(precision: str, finite: bool) -> tuple[Any, Any]:
+    """Functions (deviatoric strain, J - 1) -> whole strain; (its stress, J - 1) -> (deviator, pressure as above)."""
+    R, mat33 = scalars(precision).real, scalars(precision).mat33
     k = kinematics(precision, finite)
     volume_strain, conjugate_pressure = k.volume_strain, k.conjugate_pressure
 
@@ -199,8 +63,38 @@ def _general_point(precision: str, law_name: str, finite: bool, points: int) -> 
             S[i, i] = S[i, i] - mean
         return S, conjugate_pressure(mean, theta)
 
+    return whole, split
+
+
+@cache
+def material_point(precision: str, law_name: str, finite: bool, points: int = 0) -> MaterialPoint:
+    """The point of a law, elastic where that is "", with the strain of `law_kinematics`; `points` as above.
+
+    Raises:
+        RequestError: a hyperelastic law is to take small strain.
+    """
+    functions = law_functions(law_name, precision)
+    t = scalars(precision)
+    R, mat33, vector = t.real, t.mat33, wp.types.vector(max(1, functions.size), t.real)
+    if functions.hyperelastic and not finite:
+        raise bad_value("Body.kinematics", "corotational", "a hyperelastic law needs kinematics='finite'")
+    general, viscous, hyperelastic, rated = (
+        functions.general,
+        functions.viscous,
+        functions.hyperelastic,
+        functions.rated,
+    )
+    plastic, row = bool(law_name), functions.plastic_row
+    flow_at, rated_at = (make(precision, law_name, points) for make in (flow_function, rated_function))
+    read_history, write_history = history_functions(precision, law_name, points)
+    plastic_strain, _ = plastic_strain_functions(precision, law_name)
+    whole, split = whole_functions(precision, finite)
+    read_parameters, law_energies = functions.parameters, functions.energies
+    law_stress, deviatoric, mandel = functions.stress, functions.deviatoric, functions.mandel
+    stored_energy, plastic_energy, plastic_work = functions.stored, functions.plastic_energy, functions.plastic_work
+
     @wp.func
-    def plastic_strain_of(h: vector):
+    def kept_plastic_strain(h: vector):
         if wp.static(row >= 0):
             return h[wp.static(max(row, 0))]
         return R(0.0)
@@ -218,11 +112,26 @@ def _general_point(precision: str, law_name: str, finite: bool, points: int) -> 
         dt: R,
         history_out: wp.array2d(dtype=R),
     ):
-        h = read_history(history_out, g, e)
-        T, h_new = law_stress(whole(strain, theta), h, dt, read_parameters(law, m, R(1.0)))
-        write_history(history_out, g, e, h_new)
-        S, pressure = split(T, theta)
-        return S, pressure, plastic_strain_of(h_new) - plastic_strain_of(h)
+        pressure = R(0.0)
+        dp = R(0.0)
+        if wp.static(general):
+            h = read_history(history_out, g, e)
+            T, h_new = law_stress(whole(strain, theta), h, dt, read_parameters(law, m, R(1.0)))
+            write_history(history_out, g, e, h_new)
+            S, pressure = split(T, theta)
+            dp = kept_plastic_strain(h_new) - kept_plastic_strain(h)
+        elif wp.static(viscous):
+            S, h = deviatoric(strain, read_history(history_out, g, e), dt, read_parameters(law, m, R(1.0)))
+            write_history(history_out, g, e, h)
+        elif wp.static(hyperelastic):
+            S = mandel(strain, read_parameters(law, m, R(1.0)))
+        elif wp.static(rated):
+            S, dp = rated_at(R(2.0) * G * strain, G, g, e, m, flag, law, dt, history_out)
+        elif wp.static(plastic):
+            S, dp = flow_at(R(2.0) * G * strain, G, g, e, m, flag, law, history_out)
+        else:
+            S = R(2.0) * G * strain
+        return S, pressure, dp
 
     @wp.func
     def read(
@@ -236,11 +145,37 @@ def _general_point(precision: str, law_name: str, finite: bool, points: int) -> 
         law: wp.array2d(dtype=R),
         history: wp.array2d(dtype=R),
     ):
-        h = read_history(history, g, e)
-        c = read_parameters(law, m, R(1.0))
-        T, _h = law_stress(whole(strain, theta), h, R(0.0), c)
-        S, pressure = split(T, theta)
-        stored, dissipated = law_energies(whole(strain, theta), h, c)
-        return S, pressure, plastic_strain_of(h), stored, dissipated
+        pressure = R(0.0)
+        p = R(0.0)
+        dissipated = R(0.0)
+        if wp.static(general):
+            h = read_history(history, g, e)
+            c = read_parameters(law, m, R(1.0))
+            T, _h = law_stress(whole(strain, theta), h, R(0.0), c)
+            S, pressure = split(T, theta)
+            p = kept_plastic_strain(h)
+            stored, dissipated = law_energies(whole(strain, theta), h, c)
+        elif wp.static(viscous):
+            h = read_history(history, g, e)
+            c = read_parameters(law, m, R(1.0))
+            S, _h = deviatoric(strain, h, R(0.0), c)
+            stored, dissipated = law_energies(strain, h, c)
+        elif wp.static(hyperelastic):
+            c = read_parameters(law, m, R(1.0))
+            S = mandel(strain, c)
+            stored = stored_energy(strain, c)
+        else:
+            eps_p = mat33()
+            if wp.static(plastic):
+                if flag != 0:
+                    h = read_history(history, g, e)
+                    eps_p, p = plastic_strain(h)
+                    if wp.static(rated):
+                        dissipated = plastic_work(h, read_parameters(law, m, R(1.0)))
+                    else:
+                        dissipated = plastic_energy(eps_p, p, read_parameters(law, m, R(1.0)))
+            stored = G * wp.ddot(strain - eps_p, strain - eps_p)
+            S = R(2.0) * G * (strain - eps_p)
+        return S, pressure, p, stored, dissipated
 
-    return MaterialPoint(functions.size, True, update, read)
+    return MaterialPoint(functions.size, general, update, read)

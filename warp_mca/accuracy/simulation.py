@@ -28,6 +28,7 @@ from warp_mca.phases.prepare import Clock, Request
 from warp_mca.phases.settings import settings_of
 from warp_mca.phases.simulate import simulate
 from warp_mca.recorders.recorder import Recorder
+from warp_mca.results.criteria import with_verdict
 from warp_mca.results.result import Result
 from warp_mca.results.storage import check_output, hold, write
 from warp_mca.scene import Scene
@@ -98,7 +99,7 @@ def run(
     again = partial(run, device=device, precision=precision, threads=threads, duration=duration)
     plan = planned(scene, accuracy, typed, device, meshes, again)
     request = Request(span=span, settings=settings, tell=tell, recorders=recorders)
-    return run_planned(plan, partial(_kept, partial(_result, scene, meshes, method, request), out, force, every))
+    return run_planned(plan, partial(_kept, partial(_judged, scene, meshes, method, request), out, force, every))
 
 
 def _every(
@@ -154,6 +155,18 @@ def _check_files(recorders: Sequence[Recorder], out: str | os.PathLike[str] | No
 
     check_recorders(recorders)
     check_files(recorders, None if out is None else check_output(out, force=force))
+
+
+def _judged(
+    scene: Scene,
+    meshes: Mapping[str, Mesh] | None,
+    method: str,
+    request: Request,
+    store: Checkpoint | None,
+    plan: Plan | None,
+) -> Result:
+    """What came of a request, with the verdict of the scene's criteria; raises as `_result`."""
+    return with_verdict(_result(scene, meshes, method, request, store, plan), scene.criteria)
 
 
 def _result(

@@ -23,6 +23,12 @@ class GuardError(McaError, RuntimeError):
     exit_status = 1
 
 
+class CriterionError(McaError):
+    """A run that is sound, of which a criterion does not hold."""
+
+    exit_status = 3
+
+
 def bad_value(field: str, value: object, remedy: str) -> RequestError:
     """One sentence that names the field, the value it had and what to do about it."""
     return RequestError(f"{field} = {_shown(value)}: {remedy}")

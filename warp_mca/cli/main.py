@@ -1,7 +1,7 @@
 """Owns the entry point of the command line, its exit status, and how signals and errors end a command.
 
-Exit status: 0 done, 1 a guard stopped the run, 2 the request cannot be carried out, 129 the terminal is gone, 130
-interrupted, 141 nobody reads what is printed, 143 terminated.
+Exit status: 0 done, 1 a guard stopped the run, 2 the request cannot be carried out, 3 a criterion does not hold, 129
+the terminal is gone, 130 interrupted, 141 nobody reads what is printed, 143 terminated.
 """
 
 from __future__ import annotations

@@ -242,6 +242,8 @@ def _add_scene(parser: argparse.ArgumentParser, more: str = "") -> None:
     _add_element(group, choices=None)  # `--import` may bring more
     _add_import(group)
     group.add_argument("--set", dest="settings", action="append", default=[], metavar="KEY=VALUE", help=help_text)
+    help_text = "what must hold, as 'max_von_mises(shell) < 60e6', else exit status 3; once for each"
+    group.add_argument("--criterion", dest="criteria", action="append", default=[], metavar="TEXT", help=help_text)
 
 
 def _add_recorders(parser: argparse.ArgumentParser) -> None:

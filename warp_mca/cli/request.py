@@ -117,4 +117,4 @@ def _with(scene: Scene, args: argparse.Namespace, scale: float | None) -> Scene:
         scene = dataclasses.replace(scene, bodies=tuple(dataclasses.replace(b, element=element) for b in scene.bodies))
     if scale is not None:
         scene = dataclasses.replace(scene, impact=dataclasses.replace(scene.impact, time_step_scale=scale))
-    return scene
+    return dataclasses.replace(scene, criteria=(*scene.criteria, *args.criteria)) if args.criteria else scene

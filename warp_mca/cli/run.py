@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import warp_mca as mca
-from warp_mca.base.errors import McaError, bad_value
+from warp_mca.base.errors import CriterionError, McaError, bad_value
 from warp_mca.base.log import LOGGER
 from warp_mca.cli import part_script, sweep
 from warp_mca.cli.accuracy import accuracy_asked
@@ -30,6 +30,7 @@ def run(args: argparse.Namespace) -> None:
     """Run a scene or a sweep, and print what came of it; of a part, print a scene file."""
     from warp_mca.base.progress import progress_bar
     from warp_mca.cli.console import print_summary
+    from warp_mca.results.criteria import unmet
     from warp_mca.results.storage import CONTACT_FILES, FILES, PATH_FILES, PROBE_FILES
 
     if args.sweeps:
@@ -71,6 +72,8 @@ def run(args: argparse.Namespace) -> None:
             print(f"check: {message}")
     if result.failed:
         raise McaError(f"{', '.join(result.failed)}: not written whole, as the warnings say; all else is")
+    if failed := unmet(result.summary):
+        raise CriterionError("; ".join(failed))
 
 
 def _recorders(args: argparse.Namespace, out: Path) -> list[Recorder]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from warp_mca.base.errors import GuardError
+from warp_mca.base.errors import CriterionError, GuardError
 from warp_mca.cli.request import parameters_given, read_requests
 from warp_mca.cli.warp_start import start_warp
 
@@ -109,11 +109,13 @@ def sweep(
             progress=progress,
         )
     _print(plan, rows)
-    count = {status: sum(row["status"] == status for row in rows) for status in ("stopped", "failed")}
-    if any(count.values()):
+    count = {status: sum(row["status"] == status for row in rows) for status in ("stopped", "failed", "criterion")}
+    if count["stopped"] or count["failed"]:
         said = [f"guards stopped {count['stopped']}"] if count["stopped"] else []
         said += [f"{count['failed']} failed"] if count["failed"] else []
         raise GuardError(f"{', '.join(said)} of {len(rows)} runs")
+    if count["criterion"]:
+        raise CriterionError(f"{count['criterion']} of {len(rows)} runs do not meet their criteria")
 
 
 def _print(plan: Plan, rows: Sequence[Row]) -> None:
@@ -124,7 +126,7 @@ def _print(plan: Plan, rows: Sequence[Row]) -> None:
     from rich.table import Table
 
     from warp_mca.base.console import console
-    from warp_mca.studies.sweep_job import BETWEEN, DONE
+    from warp_mca.studies.sweep_job import BETWEEN, COMPLETE
     from warp_mca.studies.sweep_table import CSV, PARQUET
 
     out = console()
@@ -136,12 +138,12 @@ def _print(plan: Plan, rows: Sequence[Row]) -> None:
     table.add_column("")
     for row, chosen in list(zip(rows, plan.parameters, strict=True))[:SHOWN]:
         cells = ["", "", "", "", row["reason"] or ""]
-        if row["status"] == DONE:
+        if row["status"] in COMPLETE:
             folder = plan.run_folder(row["index"])
             peak = row["F_n_first_peak"]
             cells = ["none" if peak is None else f"{peak:.5g}", f"{row['F_t_min']:.5g} to {row['F_t_max']:.5g}"]
             cells += [f"{1e3 * row['contact_duration']:.4g}", f"{100.0 * row['energy_error']:.2g} %"]
-            cells += [f"wrote {folder}" if folder else ""]
+            cells += [row["reason"] or (f"wrote {folder}" if folder else "")]
         values = (f"{value:.10g}" if isinstance(value, float) else str(value) for value in chosen.values())
         table.add_row(*values, *cells)
     out.print(table)

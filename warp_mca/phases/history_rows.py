@@ -17,9 +17,10 @@ from warp_mca.kernels.records.columns import (
     PRESSURE,
     STICK_IMPULSE,
 )
-from warp_mca.results.contact_history import ContactHistory, contact_names
+from warp_mca.results.contact_history import ContactHistory
 from warp_mca.results.paths import path_histories
 from warp_mca.results.sensor_history import sensor_histories
+from warp_mca.scene.contacts import contact_names
 from warp_mca.system.columns import added_columns
 
 if TYPE_CHECKING:

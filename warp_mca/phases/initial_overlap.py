@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.geometry.cell_types import triangulated
 from warp_mca.phases.press_fit import STARTING, add_flush, press_rate
-from warp_mca.results.contact_history import contact_names
 from warp_mca.scene import OVERLAP_CHOICES, Contact, RigidPlane, Surface
+from warp_mca.scene.contacts import contact_names
 from warp_mca.watch.skins import depths_below
 
 if TYPE_CHECKING:

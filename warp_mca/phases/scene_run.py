@@ -14,9 +14,9 @@ from warp_mca.phases.history_rows import Rows, history_columns, joined, phase_fa
 from warp_mca.phases.rate_groups import rate_figures
 from warp_mca.physics.contact.bonds import bond_reports
 from warp_mca.physics.elements.cells import body_materials
-from warp_mca.results.contact_history import contact_names
 from warp_mca.results.result import Result, summarise
 from warp_mca.results.sensor_history import sensor_figures
+from warp_mca.scene.contacts import contact_names
 from warp_mca.step.state_figures import (
     joint_impulses,
     max_normal_force,

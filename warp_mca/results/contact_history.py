@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from warp_mca.results.force_history import contact_intervals, unfinished
 from warp_mca.results.npz import load_histories, save_histories
-from warp_mca.scene import Contact, ContactAll
 
 Array = NDArray[np.float64]
 
@@ -95,24 +94,6 @@ class ContactHistory:
             "impulse": (step * self.force.sum(axis=0)).tolist(),
             "normal": None if self.normal is None else self.normal.tolist(),
         }
-
-
-def contact_names(contacts: Sequence[Contact | ContactAll]) -> tuple[str, ...]:
-    """A name for each contact: its own, or "slave–master" by their bodies, numbered from the second of a pair on.
-
-    That of a general contact is "all".
-    """
-    taken = {contact.name for contact in contacts if contact.name is not None}
-    names: list[str] = []
-    for contact in contacts:
-        name = contact.name
-        if name is None:
-            pair = "all" if isinstance(contact, ContactAll) else "–".join(contact.sides)
-            numbered = (pair if k == 1 else f"{pair} {k}" for k in range(1, len(contacts) + 1))
-            name = next(text for text in numbered if text not in taken)
-            taken.add(name)
-        names.append(name)
-    return tuple(names)
 
 
 def save_contacts(file: Path, time: Array, contacts: Sequence[ContactHistory]) -> None:

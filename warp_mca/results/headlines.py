@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from warp_mca.results.criteria import sentence
+
 MAX_PHASES = 20  # that the summary lists
 
 
@@ -32,6 +34,7 @@ def headlines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         added = ", ".join(f"{100.0 * share:.2g} % of {name}" for name, share in shares if share > 0.0)
         yield "mass added", f"{added or 'none'}; first peak off by about {100.0 * scaling['F_n_first_peak']:.2g} %"
     yield from _accuracy(summary)
+    yield from (("criterion", sentence(item)) for item in summary.get("criteria", ()))
     rate = summary["element_steps_per_s"]
     if rate is not None:
         yield "rate", f"{rate / 1e6:.2f} M element-steps/s on {summary['device']}, {summary['precision']}"

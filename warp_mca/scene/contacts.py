@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from types import NoneType
 from typing import Literal
@@ -217,3 +218,21 @@ class ContactAll(_Springs):
     def two_way(self) -> bool:
         """Always: either direction has half the stiffness."""
         return True
+
+
+def contact_names(contacts: Sequence[Contact | ContactAll]) -> tuple[str, ...]:
+    """A name for each contact: its own, or "slave–master" by their bodies, numbered from the second of a pair on.
+
+    That of a general contact is "all".
+    """
+    taken = {contact.name for contact in contacts if contact.name is not None}
+    names: list[str] = []
+    for contact in contacts:
+        name = contact.name
+        if name is None:
+            pair = "all" if isinstance(contact, ContactAll) else "–".join(contact.sides)
+            numbered = (pair if k == 1 else f"{pair} {k}" for k in range(1, len(contacts) + 1))
+            name = next(text for text in numbered if text not in taken)
+            taken.add(name)
+        names.append(name)
+    return tuple(names)

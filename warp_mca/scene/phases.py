@@ -5,12 +5,15 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import dataclass
 from types import NoneType
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.scene.bodies import Vec3
 from warp_mca.scene.contacts import RigidPlane, Surface
+
+if TYPE_CHECKING:
+    from warp_mca.scene.scene import Scene
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -252,3 +255,28 @@ def is_mass_scaling(value: object) -> bool:
         with suppress(ValueError):
             return validate.is_time(float(value[:-1]))
     return validate.is_number(value) and value >= 1.0  # pyright: ignore[reportOperatorIssue]
+
+
+def check_t_end(scene: Scene) -> None:
+    """Refuse an end that no cycle of swings and impacts can reach.
+
+    Raises:
+        RequestError: it is no time above 0, or the scene does not swing, has driven nodes or absorbing sides.
+    """
+    if scene.t_end is None:
+        return
+    validate.times("Scene", t_end=scene.t_end)
+    if scene.rigid is None:
+        raise bad_value("Scene.t_end", scene.t_end, "swings and impacts in turn need a RigidPhase; give one")
+    if scene.impact.mass_scaling is not None:
+        remedy = "links that get rigid again have their own masses; leave mass_scaling out, or t_end"
+        raise bad_value("ImpactPhase.mass_scaling", scene.impact.mass_scaling, remedy)
+    for present, why in (
+        (scene.absorbing, "a cut body with absorbing sides does not move between impacts as the large one"),
+        ([a for a in scene.loads if not a.inner], "loads act in an impact alone, not in the swings between"),
+        (any(item.bond for item in scene.listed), "bonds act in an impact alone, not in the swings between"),
+        (scene.failing, "elements that failed cannot become rigid again"),
+        (scene.prescribed, "nodes with a Prescribed velocity cannot follow it between impacts"),
+    ):
+        if present:
+            raise bad_value("Scene.t_end", scene.t_end, f"{why}; leave t_end out")

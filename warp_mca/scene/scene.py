@@ -12,12 +12,13 @@ from warp_mca.base.errors import bad_value
 from warp_mca.scene.absorbing import Absorbing
 from warp_mca.scene.bodies import Body, Vec3
 from warp_mca.scene.contacts import Contact, ContactAll, RigidPlane, Surface
+from warp_mca.scene.criteria import check_criteria
 from warp_mca.scene.drives import Fixed, Prescribed
 from warp_mca.scene.failure import check_contacts
 from warp_mca.scene.joints import JOINTS, Joint, Prismatic, Weld
 from warp_mca.scene.loads import LOADS, Load
 from warp_mca.scene.masses import PointMass
-from warp_mca.scene.phases import PHASES, ImpactPhase, RigidPhase
+from warp_mca.scene.phases import PHASES, ImpactPhase, RigidPhase, check_t_end
 from warp_mca.scene.probes import Path, Point
 from warp_mca.scene.sensors import Probe, Section, check_class
 from warp_mca.scene.tied_surfaces import Tie
@@ -62,6 +63,7 @@ class Scene:
         sections: cuts through bodies whose resultants are recorded.
         tip: point whose velocity the history lists as tip_vx, tip_vy, tip_vz.
         target: point whose velocity the history lists as plate_vx, plate_vy, plate_vz.
+        criteria: what must hold, see `scene.criteria`, as ("max_von_mises(shell) < 60e6",).
         refine: how many times smaller the cells of all bodies are to be than their recipes say [-], with their
             grading; above 1 is finer, below coarser.
         parameters: the values that a built-in scene was made from, for the record.
@@ -88,6 +90,7 @@ class Scene:
     up: Vec3 | None = None
     tip: Point | None = None
     target: Point | None = None
+    criteria: tuple[str, ...] = ()
     refine: float = 1.0
     parameters: Mapping[str, object] = field(default_factory=dict)
 
@@ -104,7 +107,7 @@ class Scene:
         self._check_kinds("loads", LOADS)
         validate.kinds("Scene", ImpactPhase, "give an ImpactPhase", impact=self.impact)
         validate.kinds("Scene", (RigidPhase, NoneType), "give a RigidPhase or None", rigid=self.rigid)
-        self._check_t_end()
+        check_t_end(self)
         self._check_phases()
         if self.masses and self.rigid:
             raise bad_value("Scene.masses", "PointMass", "links of a RigidPhase take none; leave one of them out")
@@ -144,6 +147,7 @@ class Scene:
         for probe in self.probes:
             if probe.cfc is not None:
                 check_class(f"{probe.title}.cfc", probe.cfc, self.impact.output_interval)
+        check_criteria(self)
         for section in self.sections:
             if section.body in self.rigid_names:
                 raise bad_value(f"{section.title}.body", section.body, "it is rigid, without stress; cut another body")
@@ -159,30 +163,6 @@ class Scene:
             if type(item) not in table.values():
                 remedy = f"give a {' or a '.join(table) or 'Load'}; register other classes by warp_mca.register"
                 raise bad_value(f"Scene.{name}[{k}]", validate.brief(item), remedy)
-
-    def _check_t_end(self) -> None:
-        """Refuse an end that no cycle of swings and impacts can reach.
-
-        Raises:
-            RequestError: it is no time above 0, or the scene does not swing, has driven nodes or absorbing sides.
-        """
-        if self.t_end is None:
-            return
-        validate.times("Scene", t_end=self.t_end)
-        if self.rigid is None:
-            raise bad_value("Scene.t_end", self.t_end, "swings and impacts in turn need a RigidPhase; give one")
-        if self.impact.mass_scaling is not None:
-            remedy = "links that get rigid again have their own masses; leave mass_scaling out, or t_end"
-            raise bad_value("ImpactPhase.mass_scaling", self.impact.mass_scaling, remedy)
-        for present, why in (
-            (self.absorbing, "a cut body with absorbing sides does not move between impacts as the large one"),
-            ([a for a in self.loads if not a.inner], "loads act in an impact alone, not in the swings between"),
-            (any(item.bond for item in self.listed), "bonds act in an impact alone, not in the swings between"),
-            (self.failing, "elements that failed cannot become rigid again"),
-            (self.prescribed, "nodes with a Prescribed velocity cannot follow it between impacts"),
-        ):
-            if present:
-                raise bad_value("Scene.t_end", self.t_end, f"{why}; leave t_end out")
 
     def _check_phases(self) -> None:
         """Refuse phases that are not known, or that cannot come before this impact.

@@ -17,6 +17,7 @@ from warp_mca.phases.arguments import Progress, check_scene, one_at_a_time, show
 from warp_mca.phases.prepare import Request
 from warp_mca.phases.settings import settings_of
 from warp_mca.phases.simulate import simulate
+from warp_mca.results.criteria import with_verdict
 from warp_mca.results.result import Result
 from warp_mca.results.storage import ALL_FILES, check_output, folder_path, save
 from warp_mca.scene import Contact, ContactAll, Scene
@@ -74,7 +75,9 @@ def run_batch(
     settings = settings_of(device, precision, threads)
     _check_meshes(meshes, len(scenes))
     with hold_scenes(out, len(scenes), force) as folders:
-        return save_scenes(simulate(scenes, meshes, Request(span=span, settings=settings, tell=tell)), folders, force)
+        found = simulate(scenes, meshes, Request(span=span, settings=settings, tell=tell))
+        judged = [with_verdict(result, scene.criteria) for result, scene in zip(found, scenes, strict=True)]
+        return save_scenes(judged, folders, force)
 
 
 def _check_meshes(meshes: object, count: int) -> None:

@@ -83,8 +83,8 @@ def sweep(
 
     Returns:
         A row for each scene: index, the parameters that differ (`parameter.NAME` where an entry of the summary has
-        this name, or it has dots), status (done, stopped, failed), reason, all single values of its summary, warnings,
-        wall time [s]. Stopped and failed runs have no figures.
+        this name, or it has dots), status (done, criterion where one of the scene does not hold, stopped, failed),
+        reason, all single values of its summary, warnings, wall time [s]. Stopped and failed runs have no figures.
 
     Raises:
         RequestError: the request cannot be carried out; nothing was written.

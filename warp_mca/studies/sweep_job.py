@@ -20,6 +20,7 @@ from warp_mca.base.errors import GuardError, McaError
 from warp_mca.base.log import LOGGER
 from warp_mca.base.outside import import_named, imported
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.results.criteria import unmet
 from warp_mca.results.result import Result
 from warp_mca.results.storage import save
 from warp_mca.scene import Scene, catalogue, model_file
@@ -29,7 +30,9 @@ from warp_mca.studies.sweep_plan import RunOptions, one_line, plain
 
 Row = dict[str, Any]  # of a sweep's table, by column: texts, numbers, True or False, None
 
-DONE, STOPPED, FAILED = "done", "stopped", "failed"  # what a row's status may be
+# What a row's status may be; "criterion": done, but a criterion of the scene does not hold.
+DONE, CRITERION, STOPPED, FAILED = "done", "criterion", "stopped", "failed"
+COMPLETE = (DONE, CRITERION)  # with figures
 # entries of a summary that rows hold otherwise
 NO_FIGURES = ("wall", "parameters", "batch", "warnings", "files", "units")
 BETWEEN = " | "  # between the warnings of a run
@@ -95,7 +98,7 @@ def run_job(job: Job) -> list[Row]:
     Scenes that cannot be run in one model run one by one. Nothing else that goes wrong in a run is raised.
 
     Returns:
-        Of each run `status`, `reason`, `warnings`, figures and `wall`.
+        Of each run `status`, `reason`, `warnings`, figures and `wall`; no figures where it was stopped or failed.
 
     Raises:
         DeviceLost: the device takes no more work of this process.
@@ -178,9 +181,10 @@ def _outcome(result: Result) -> Row:
     summary = result.summary
     rest = {key: value for key, value in summary.items() if key not in NO_FIGURES}
     wall = sum(summary["wall"].values())
+    failed = unmet(summary)
     return {
-        "status": DONE,
-        "reason": None,
+        "status": CRITERION if failed else DONE,
+        "reason": one_line("; ".join(failed)) if failed else None,
         **dict(figures(rest)),
         "warnings": BETWEEN.join(map(one_line, result.warnings)) or None,
         "wall": wall,

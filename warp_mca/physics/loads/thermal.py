@@ -43,24 +43,6 @@ class HeatedBody(TimedNodes):
     on_nodes = False
 
 
-@dataclass(eq=False)
-class ThermalState:
-    """What is kept of heated elements, as `kernels.loads.thermal.Kept` says.
-
-    Attributes:
-        strain, before: thermal strain in the latest step and the one before it [-], shape (count,), float64.
-        stress: three times the mean stress in the one before [Pa], shape (count,), float64.
-        work: up to then [J], shape (count,), float64.
-        clock: steps taken [-], shape (count,), int32.
-    """
-
-    strain: wp.array
-    before: wp.array
-    stress: wp.array
-    work: wp.array
-    clock: wp.array
-
-
 def build(load: ThermalStrain, assembly: Bodies) -> HeatedBody:
     """Arrays of a load.
 
@@ -122,10 +104,13 @@ class Stage(NodalLoad):
         """Heated elements of each scene."""
         return self._counts
 
-    def new_state(self) -> ThermalState:
-        """State before the first step, on the current device."""
-        kept = {name: wp.zeros(self.count, dtype=wp.float64) for name in ("strain", "before", "stress", "work")}
-        return ThermalState(**kept, clock=wp.zeros(self.count, dtype=wp.int32))
+    def new_state(self) -> Any:
+        """State before the first step, on the current device: a `kernels.loads.thermal.Kept`."""
+        found = Kept()
+        for name in ("strain", "before", "stress", "work"):
+            setattr(found, name, wp.zeros(self.count, dtype=wp.float64))
+        found.clock = wp.zeros(self.count, dtype=wp.int32)
+        return found
 
     def _kind(self, element: ElementStage) -> tuple[str, bool]:
         return self.solver.precision, element.block.finite
@@ -158,10 +143,13 @@ class Stage(NodalLoad):
 
     def energies_of(self, state: State) -> list[wp.array]:
         """Work up to t(n), once forces are known there."""
-        own, kept = state.parts[self.name], Kept()
-        for name in ("strain", "before", "stress", "work", "clock"):
-            setattr(kept, name, getattr(own, name))
         for element, heated in self.parts:
-            inputs = [heated, kept, element.material, self.work.law, state.elements[element.index].extreme]
+            inputs = [
+                heated,
+                state.parts[self.name],
+                element.material,
+                self.work.law,
+                state.elements[element.index].extreme,
+            ]
             wp.launch(work_kernel(*self._kind(element)), len(heated.element), inputs=inputs, outputs=[self.entry])
         return [self.entry]
