@@ -105,3 +105,15 @@ def test_a_body_force_goes_on_acting_on_nodes_without_elements():
     impact.advance()
     gained = 1e8 * impact.solver.dt * (impact.state.steps - steps)
     np.testing.assert_allclose(impact.state.v.numpy()[end, 0] - before, gained, rtol=1e-9)
+
+
+@pytest.mark.gpu
+def test_a_gpu_does_alike():
+    pull = mca.Pressure(body="bar", nodes="xmax", pressure=-2e8)
+    for scene in (crushed("tet10", 0.1, 2), loaded("hex8i", pull, failure=mca.PrincipalStressFailure(stress=1e8))):
+        one, other = (mca.run(scene, device=device).summary for device in ("cpu", "cuda:0"))
+        assert other["energy_error"] < 5e-3
+        name = scene.bodies[0].name
+        assert other["failure"][name]["elements"] == pytest.approx(one["failure"][name]["elements"], rel=0.2)
+        work = one["energy"]["external_work"]
+        assert other["energy"]["external_work"] == pytest.approx(work, rel=0.02, abs=1e-9)

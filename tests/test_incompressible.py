@@ -27,17 +27,16 @@ def test_forces_are_the_slope_of_the_energy(material: mca.Elastic):
         assert -(force * way).sum() == pytest.approx(slope, rel=1e-5, abs=1e-5 * np.abs(force).max())
 
 
-def pulled(element: str, way: float, axis: str, **change: float) -> mca.Result:
+def pulled(element: str, way: float, axis: str, device: str = "cpu") -> mca.Result:
     """A strip, both ends of which are held and one driven; its output is one of energy."""
     strip = mca.Box(size=(0.03, 0.01, 0.01), divisions=(6, 2, 2))
-    body = mca.Body(
-        name="strip", geometry=strip, material=mca.Elastic(**{**SOFT, **change}), kinematics="finite", element=element
-    )
+    body = mca.Body(name="strip", geometry=strip, material=mca.Elastic(**SOFT), kinematics="finite", element=element)
     ends = {"body": "strip", "nodes": "xmax", "times": (0.0, 5e-3)}
     drives = tuple(mca.Prescribed(**ends, axis=a, displacements=(0.0, way if a == axis else 0.0)) for a in "xyz")
     held = mca.Fixed(body="strip", nodes="xmin")
     impact = mca.ImpactPhase(duration=5e-3, output_interval=5e-5)
-    return mca.run(mca.Scene(name="pulled", bodies=(body,), fixed=(held,), prescribed=drives, impact=impact))
+    scene = mca.Scene(name="pulled", bodies=(body,), fixed=(held,), prescribed=drives, impact=impact)
+    return mca.run(scene, device=device)
 
 
 @pytest.mark.parametrize(("way", "axis", "closeness"), [(0.03, "x", 0.2), (0.02, "z", 0.12), (0.01, "z", 0.06)])
@@ -46,3 +45,10 @@ def test_a_strip_is_stretched_and_sheared(way: float, axis: str, closeness: floa
     found, plain = (pulled(element, way, axis).summary for element in ("hex8i", "hex8"))
     assert found["energy_error"] < 2e-3
     assert found["energy"]["external_work"] == pytest.approx(plain["energy"]["external_work"], rel=closeness)
+
+
+@pytest.mark.gpu
+def test_a_gpu_stretches_a_strip_alike():
+    one, other = (pulled("hex8i", 0.02, "x", device).summary["energy"] for device in ("cpu", "cuda:0"))
+    assert other["external_work"] == pytest.approx(one["external_work"], rel=1e-4)
+    assert abs(other["error"]) < 2e-3 * other["external_work"]
