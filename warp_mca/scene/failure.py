@@ -104,8 +104,8 @@ class JohnsonCookFailure(StrainFailure):
     Attributes:
         D1, D2, D3, D4, D5: of the strain at failure [-]; D3 is negative where tension is worse than compression.
         rate_0: rate of the equivalent plastic strain at which they were measured [1/s].
-        least_strain: strain at failure where the expression gives less, or less than 0 [-]: EFMIN of LS-DYNA, of the
-            same default, by which such points fail at their first flow.
+        least_strain: strain at failure where the expression gives less, or less than 0 [-]: EFMIN of
+            *MAT_JOHNSON_COOK. By default such points fail at their first flow.
     """
 
     D1: float
