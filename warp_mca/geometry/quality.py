@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from warp_mca.base.chunks import CHUNK, chunks
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.geometry.cell_types import CELL_TYPES, linear_type
+from warp_mca.geometry.inertia_brick import CARRIERS
 from warp_mca.geometry.integrals import integrals_of
 from warp_mca.geometry.mesh import Mesh
 
@@ -149,6 +150,8 @@ def check_whole(mesh: Mesh, name: str) -> None:
             raise bad_value(owner, list(twice), f"these two cells have the same corners; {_KEEP_ONE}")
     if not mesh.cell_count:
         raise bad_value(f"body {name}: Mesh.hexahedra", 0, "give at least one cell")
+    if isinstance(mesh.node_sets, Mapping):
+        used[mesh.node_sets.get(CARRIERS, [])] = True  # these carry a mass that a body was given
     if not used.all():
         idle = int(np.argmin(used))
         raise bad_value(f"body {name}: Mesh.points", idle, "this node is in no cell; leave it out of the mesh")

@@ -10,7 +10,7 @@ import numpy as np
 
 from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
-from warp_mca.robots.geoms import filled, geom_surface, joined, with_node
+from warp_mca.robots.geoms import filled, geom_surface, is_long, is_round, joined, touching_at
 from warp_mca.robots.machine import Machine, Motion
 from warp_mca.scene import Body, Contact, RigidPlane, Surface
 from warp_mca.scene.metals import J2Bilinear
@@ -46,7 +46,8 @@ class Contacts:
         self._duration, (self._stiffness, self._mu, self._faces) = duration, springs
         self.found: list[Contact] = []
         self.held: list[str] = []
-        self._touched: dict[int, list[Array]] = {}  # points of geoms that shall be nodes, in the geoms' frames
+        # points of geoms that shall be nodes or, with a normal, in the middle of a face, in the geoms' frames
+        self._touched: dict[int, list[tuple[Array, Array | None]]] = {}
         self._sets: dict[int, str] = {}
 
     def add(self, pairs: Sequence[Pair]) -> None:
@@ -63,12 +64,26 @@ class Contacts:
             touched = touch is not None and (pair.first.name, pair.second.name) == (touch.first, touch.second)
             if nearest.distance > reach and not touched:
                 continue
-            for side, point in ((pair.first, nearest.first), (pair.second, nearest.second)):
-                if side.geom is not None:
-                    pose = side.pose(self._machine.place(q), t)
-                    self._touched.setdefault(side.geom, []).append((point - pose.origin) @ pose.rotation)
             normal = touch.normal if touch is not None and touched else None
+            self._mark(pair, (nearest.first, nearest.second), normal)
             self._join(pair, normal)
+
+    def _mark(self, pair: Pair, points: tuple[Array, Array], normal: Array | None) -> None:
+        """Note where the geoms of a pair touch: with a node, or one of two round ones, the longer, with a face."""
+        machine, t, q = self._machine, self._swing.t_end, self._swing.qpos
+        across = points[1] - points[0] if normal is None else normal
+        poses = [side.pose(machine.place(q), t) for side in (pair.first, pair.second)]
+        own = [(point - pose.origin) @ pose.rotation for point, pose in zip(points, poses, strict=True)]
+        geoms = (pair.first.geom, pair.second.geom)
+        both = all(
+            geom is not None and is_round(machine.mj, machine, geom, point)
+            for geom, point in zip(geoms, own, strict=True)
+        )
+        flat = 0 if both and is_long(machine, geoms[0]) and not is_long(machine, geoms[1]) else 1
+        for k, geom in enumerate(geoms):
+            if geom is not None:
+                face = across @ poses[k].rotation if both and k == flat and across.any() else None
+                self._touched.setdefault(geom, []).append((own[k], face))
 
     def _speed(self) -> float:
         """A bound of the speed of all links and bodies beside [m/s]."""
@@ -142,8 +157,8 @@ class Contacts:
     def _mesh(self, geom: int) -> Mesh:
         mj, name = self._machine.mj, self._sets[geom]
         surface = geom_surface(mj, self._machine, geom, name, self._faces)
-        for point in self._touched.get(geom, ()):
-            surface = with_node(mj, self._machine, geom, surface, point, self._faces)
+        for touch in self._touched.get(geom, ()):
+            surface = touching_at(mj, self._machine, geom, surface, touch, self._faces)
         return filled(name, surface, name)
 
     def beside(self) -> list[Body]:

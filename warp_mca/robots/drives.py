@@ -45,9 +45,6 @@ def refuse_at_hand_off(machine: Machine) -> None:
             if several and value:
                 remedy = "an impact carries it for hinges and slides; leave it out, or give hinges that meet"
                 raise bad_value(f"{what} of joint {names.joint(k)}", float(value), remedy)
-        if model.jnt_actfrclimited[k] and not several:
-            remedy = "an impact clamps each actuator alone; give the actuator a forcerange"
-            raise bad_value(f"actuatorfrcrange of joint {names.joint(k)}", tuple(model.jnt_actfrcrange[k]), remedy)
 
 
 class Drive(NamedTuple):
@@ -117,6 +114,14 @@ def _motor(machine: Machine, joint: int, zero: float) -> tuple[Amplitude | Posit
         raise bad_value("Robot: actuators of joint", name, remedy)
     constant, kp, kv = (float(v) for v in np.sum([drive[:3] for drive in drives], axis=0))
     limits = drives[0].limits
+    if model.jnt_actfrclimited[joint]:  # effort of a URDF
+        if len(drives) > 1:
+            low, high = (float(v) for v in model.jnt_actfrcrange[joint])
+            remedy = "actuators that share a joint whose sum is clamped are not carried; give the joint one"
+            raise bad_value(f"actuatorfrcrange of joint {name}", (low, high), remedy)
+        low, high = (-np.inf, np.inf) if limits is None else limits
+        least, most = (float(v) for v in model.jnt_actfrcrange[joint])
+        limits = (max(low, least), min(high, most))
     if kp < 0.0 or kv < 0.0:
         remedy = "it drives the joint away from where it is; give a servo with kp and kv of 0 or above"
         raise bad_value("Robot: actuators of joint", name, remedy)

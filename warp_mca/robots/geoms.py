@@ -89,23 +89,49 @@ def _turned(outline: Array, around: int) -> tuple[Array, Index]:
     return points, np.concatenate(faces).astype(np.int32)
 
 
-def with_node(
-    mj: Any, machine: Machine, geom: int, surface: tuple[Array, Index], point: Array, around: int
+def is_round(mj: Any, machine: Machine, geom: int, point: Array) -> bool:
+    """Whether a geom is curved at a point in its frame [m]: boxes, meshes and ends of cylinders are not."""
+    kinds = [int(getattr(mj.mjtGeom, f"mjGEOM_{key}")) for key in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER")]
+    kind, radius = int(machine.model.geom_type[geom]), float(machine.model.geom_size[geom][0])
+    return kind in kinds and (kind != kinds[3] or math.hypot(point[0], point[1]) > (1.0 - ON_RIM) * radius)
+
+
+def is_long(machine: Machine, geom: int | None) -> bool:
+    """Whether a geom is a capsule or a cylinder."""
+    known = [int(getattr(machine.mj.mjtGeom, f"mjGEOM_{key}")) for key in ("CAPSULE", "CYLINDER")]
+    return geom is not None and int(machine.model.geom_type[geom]) in known
+
+
+def touching_at(
+    mj: Any, machine: Machine, geom: int, surface: tuple[Array, Index], touch: tuple[Array, Array | None], around: int
 ) -> tuple[Array, Index]:
     """The surface of a round geom with a node where it touches [m], in place of all nodes that are near.
 
     Nodes are near up to the distance of those around the geom, so that one alone touches first. Surfaces of boxes and
-    meshes stay: they touch with a corner, or are touched on a face.
+    meshes stay: they touch with a corner, or are touched on a face. With a normal in `touch` the geom has a flat face
+    there instead, for the node of another round geom: of two nodes that meet each would slide off the other's faces.
     """
-    kinds = [int(getattr(mj.mjtGeom, f"mjGEOM_{key}")) for key in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER")]
-    kind, sizes = int(machine.model.geom_type[geom]), machine.model.geom_size[geom]
-    rim = math.hypot(point[0], point[1]) > (1.0 - ON_RIM) * float(sizes[0])
-    if kind not in kinds or (kind == kinds[3] and not rim):
+    point, normal = touch
+    if not is_round(mj, machine, geom, point):
         return surface
-    radius = float(sizes.min()) if kind == kinds[2] else float(sizes[0])
-    points = surface[0]
-    away = np.linalg.norm(points - point, axis=1)
-    return hull(np.vstack([points[away > NEAR * 2.0 * np.pi * radius / around], point]))
+    sizes = machine.model.geom_size[geom]
+    ellipsoid = int(machine.model.geom_type[geom]) == int(mj.mjtGeom.mjGEOM_ELLIPSOID)
+    spacing = 2.0 * np.pi * float(sizes.min() if ellipsoid else sizes[0]) / around
+    away = np.linalg.norm(surface[0] - point, axis=1)
+    placed: Any = point[None]
+    if normal is not None:
+        side = is_long(machine, geom) and abs(point[2]) < float(sizes[1])
+        one = np.cross(normal, np.eye(3)[2] if side else np.eye(3)[np.abs(normal).argmin()])
+        one = 0.5 * spacing * one / np.linalg.norm(one)
+        other = np.cross(normal, one)
+        placed = point + np.array([one, other, -one, -other])
+        if side:  # all along the straight part, whose nodes are at its ends
+            ends = np.array([[point[0], point[1], sign * float(sizes[1])] for sign in (-1.0, 1.0)])
+            placed = np.concatenate([ends + one, ends - one])
+            away = np.linalg.norm(surface[0][:, :2] - point[:2], axis=1) + np.maximum(
+                np.abs(surface[0][:, 2]) - float(sizes[1]), 0.0
+            )
+    return hull(np.asarray(np.vstack([surface[0][away > NEAR * spacing], placed]), dtype=np.float64))
 
 
 def hull(points: Array) -> tuple[Array, Index]:

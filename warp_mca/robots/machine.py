@@ -10,12 +10,13 @@ import numpy as np
 from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.base.rotation import rotation_matrix
-from warp_mca.robots.masses import MassProperties, of_link, rest_of
+from warp_mca.robots.masses import MassProperties, of_link, regular, rest_of
 from warp_mca.robots.reading import Names, compiled, mujoco, with_masses
 from warp_mca.robots.start import start_of
 
 if TYPE_CHECKING:
     from warp_mca.robots.robot import Robot
+    from warp_mca.robots.swing import RobotSwing
 
 LIMIT_RATE = 2000.0  # of the spring of a limit on the inertia of its joint [rad/s], with critical damping
 FRICTION_RATE = 1e-2  # rate over which dry friction builds up, as in `RigidPhase.friction_rate` [rad/s, m/s]
@@ -84,7 +85,7 @@ class Machine:
         self.limited_q, self._friction = self.model.jnt_qposadr[joints], self.model.dof_frictionloss.copy()
         self.ctrl = np.zeros(self.model.nu)
         self.start = start_of(self, robot)
-        inertia = 1.0 / np.diag(np.linalg.inv(self.mass_matrix()))[self.limited]
+        inertia = 1.0 / np.diag(np.linalg.inv(regular(self)))[self.limited]
         self.limit_stiffness = inertia * LIMIT_RATE**2
         self.limit_damping = 2.0 * inertia * LIMIT_RATE
 
@@ -207,6 +208,11 @@ class Machine:
         M = np.zeros((self.nv, self.nv))
         self.mj.mj_fullM(self.model, self.data, M)
         return M
+
+    def made(self, swing: RobotSwing) -> bool:
+        """Whether a swing with as many coordinates ended with the momenta that this machine has there."""
+        self.advance(np.concatenate([swing.qpos, swing.qvel, np.zeros(2)]))
+        return bool(np.allclose(self.mass_matrix() @ swing.qvel, swing.momentum, rtol=1e-6, atol=1e-9))
 
     def mobility(self) -> Array:
         """Rates over generalised impulses at the latest data, M^-1 less what loops take, shape (nv, nv), float64."""

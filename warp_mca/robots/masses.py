@@ -13,6 +13,7 @@ from warp_mca.base.errors import bad_value
 if TYPE_CHECKING:
     from warp_mca.robots.machine import Machine
 
+SINGULAR = 1e-12  # least eigenvalue of a mass matrix with a diagonal of ones
 SAME = 0.02  # share of mass and moments of inertia by which mesh and file of a link may differ and count as the same
 
 
@@ -94,3 +95,20 @@ def rest_of(name: str, file: MassProperties, mesh: MassProperties) -> MassProper
         )
         raise bad_value(field, round(mesh.mass, 9), remedy)
     return rest
+
+
+def regular(machine: Machine) -> Array:
+    """The mass matrix of a machine at its latest data, shape (nv, nv), float64.
+
+    Raises:
+        RequestError: some freedoms move nothing, or all the same.
+    """
+    M = machine.mass_matrix()
+    scale = np.sqrt(np.maximum(np.diag(M), np.finfo(float).tiny))
+    least, vectors = np.linalg.eigh(M / np.outer(scale, scale)) if len(M) else (np.ones(1), np.zeros((0, 1)))
+    if least[0] < SINGULAR:
+        moving = np.flatnonzero(np.abs(vectors[:, 0]) > 0.1)
+        joints = dict.fromkeys(machine.names.joint(int(machine.model.dof_jntid[k])) for k in moving)
+        remedy = "at the start they move nothing, or the same; leave one out, or start in another pose"
+        raise bad_value("Robot: joints", ", ".join(joints), remedy)
+    return M

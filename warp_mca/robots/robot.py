@@ -81,6 +81,7 @@ class Robot:
         object.__setattr__(self, "path", os.fspath(self.path))
         validate.kinds("Robot", Mapping, "give a Body for each link by its name", flexible=self.flexible)
         validate.kinds("Robot", Mapping, "give a PositionServo for each joint by its name", servos=self.servos)
+        validate.kinds("Robot", Mapping, "give the node set that holds each flexible link", mounts=self.mounts)
         for name, servo in self.servos.items():
             validate.kind_of(f"Robot.servos[{name!r}]", servo, PositionServo, "give a PositionServo")
             if not validate.is_number(servo.target):
@@ -177,8 +178,9 @@ class Robot:
             stiffness: of contact between rigid surfaces, of each node [N/m]; others have the default of `Contact`.
             mu: coefficient of friction of all contacts [-]; that of the file is not read.
             swing: how it came there; None: its swing to the first touch.
-            faces: around a round geom [-], whose middles lie 0.0086 of its radius inside at 24. Where round geoms slide
-                along each other take more; the step falls.
+            faces: around a round geom [-], whose middles lie 0.0086 of its radius inside at 24. Where two round geoms
+                meet, one has a flat face at the touch, as wide as these, so that the force points right while they do
+                not slide far. Softer contact needs fewer, more than that makes corners of the face touch.
             fixed: nodes of bodies beside the machine that are held.
             name: of the scene.
 
@@ -187,6 +189,7 @@ class Robot:
                 called during the impact; a mesh has more mass than its link, or a flexible link is held nowhere.
         """
         from warp_mca.robots.handoff import HandOff
+        from warp_mca.robots.swing import RobotSwing
 
         validate.kinds("Robot.strike", ImpactPhase, "give an ImpactPhase", impact=impact)
         validate.positive("Robot.strike", stiffness=stiffness)
@@ -196,8 +199,11 @@ class Robot:
         if self.period is not None and self.period < impact.duration:
             remedy = f"controls are held during an impact, which lasts {impact.duration:g} s; give no shorter one"
             raise bad_value("Robot.period", self.period, remedy)
+        validate.kinds("Robot.strike", (RobotSwing, NoneType), "give a RobotSwing of this machine", swing=swing)
         found = self.swing() if swing is None else swing
         machine = self._machine()
+        if len(found.qpos) != machine.nq or len(found.qvel) != machine.nv or not machine.made(found):
+            raise bad_value("Robot.strike.swing", f"RobotSwing to {found.t_end:.6g} s", "it is of another machine")
         scene = HandOff(self, machine, found).scene(impact, self._pairs(machine), (stiffness, mu, faces), name)
         return replace(scene, fixed=(*scene.fixed, *fixed))
 
@@ -215,8 +221,13 @@ class Robot:
         Raises:
             RequestError: the result is not one of the scene, a flexible link yielded, or a flexible body beside moves.
         """
+        from warp_mca.results.result import Result
         from warp_mca.robots.handback import hand_back
+        from warp_mca.robots.swing import RobotSwing
 
+        validate.kinds("Robot.after", RobotSwing, "give the RobotSwing that ended at the impact", swing=swing)
+        validate.kinds("Robot.after", Scene, "give the scene that strike made", scene=scene)
+        validate.kinds("Robot.after", Result, "give what mca.run made of it", result=result)
         return hand_back(self, swing, scene, result)
 
     def mount(self, link: str, other: str | None) -> str:

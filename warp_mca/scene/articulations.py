@@ -5,14 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
+from warp_mca.base.rotation import rotation_matrix
 from warp_mca.scene.bodies import Vec3
 from warp_mca.scene.freedoms import Controller, Freedom, Whole
 from warp_mca.scene.joints import JOINTS, Joint
 
 if TYPE_CHECKING:
     from warp_mca.scene.scene import Scene
+
+PARALLEL = 1e-6  # least singular value of the screws of a joint's freedoms, over their greatest entry
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,12 +164,40 @@ def check_whole(scene: Scene) -> None:
                 raise bad_value(f"{joint.title}.{name}", given, f"{body} moves as one rigid body; leave it out")
             if body is not None and body not in rigid and given is None:
                 raise bad_value(f"{joint.title}.{name}", given, f"name a node set of {body}, which is flexible")
+        _check_independent(joint.title, whole)
         for freedom in whole.freedoms:
             if isinstance(freedom.motor, Controller):
                 _check_period(freedom.motor, scene.impact.output_interval)
         if scene.phases:
             remedy = f"joints between whole bodies, as {joint.title}, take part in the impact alone; leave phases out"
             raise bad_value("Scene.phases", "given", remedy)
+
+
+def _check_independent(title: str, whole: Whole) -> None:
+    """Refuse freedoms of which some make the same motion where the bodies stand.
+
+    Raises:
+        RequestError: there are such freedoms.
+    """
+    R, screws = np.eye(3), []
+    place = np.zeros(3)  # where the freedoms so far take the origin
+    for freedom, point in zip(whole.freedoms, whole.points, strict=True):
+        at = place + R @ np.array(point)
+        if freedom.kind == "ball":
+            screws += [np.concatenate([axis, np.cross(at, axis)]) for axis in np.eye(3)]
+            continue
+        axis = np.array(freedom.axis) / np.linalg.norm(freedom.axis)
+        along = R @ axis
+        if freedom.kind == "slide":
+            screws.append(np.concatenate([np.zeros(3), along]))
+            place = place + freedom.position * along
+        else:
+            screws.append(np.concatenate([along, np.cross(at, along)]))
+            R = R @ rotation_matrix(freedom.position * axis)
+            place = at - R @ np.array(point)
+    if screws and np.linalg.svd(np.array(screws), compute_uv=False)[-1] < PARALLEL * np.abs(screws).max():
+        what = f"{len(whole.freedoms)} of them"
+        raise bad_value(f"{title}.freedoms", what, "two make the same motion where the bodies stand; turn an axis")
 
 
 def _check_period(controller: Controller, interval: float) -> None:
