@@ -170,7 +170,7 @@ def check_whole(scene: Scene) -> None:
                 _check_period(freedom.motor, scene.impact.output_interval)
         if scene.phases:
             remedy = f"joints between whole bodies, as {joint.title}, take part in the impact alone; leave phases out"
-            raise bad_value("Scene.phases", "given", remedy)
+            raise bad_value("Scene.phases", [type(phase).__name__ for phase in scene.phases], remedy)
 
 
 def _check_independent(title: str, whole: Whole) -> None:

@@ -1,8 +1,9 @@
-"""Owns the library of materials with published parameters: `mca.library.STEEL_4340` is a material as any other.
+"""Owns the library of materials, with published or typical parameters; `mca.library.STEEL_4340` is one as any other.
 
 `SOURCES` says of each where its parameters are from, and for what they were measured. Elastic constants are those of
 handbooks where the source has none. Parameters of one's own lot and temper are better than any of these: yield stresses
 of one grade differ by 10 to 20 %, moduli of polymers, rubber and foam by more.
+Entries that say "typical" or "in common use" have no publication behind them.
 """
 
 from __future__ import annotations
@@ -70,8 +71,8 @@ EPP_30 = CrushableFoam(
 NATURAL_RUBBER = Ogden(mu=(0.63e6, 0.0012e6, -0.01e6), alpha=(1.3, 5.0, -2.0), rho=930.0)
 
 _GRADES = (
-    "between data sheets of unfilled grades for moulding, by ISO 527 at 23 degrees C: slow tension up to the yield "
-    "point, where necking begins; at 100 1/s the yield stress is 20 to 40 % higher"
+    "typical of unfilled grades for moulding at 23 degrees C, of no one data sheet: take that of the grade; slow "
+    "tension up to the yield point, where necking begins; stronger at higher rates"
 )
 SOURCES: dict[str, str] = {
     **dict.fromkeys(
@@ -86,7 +87,7 @@ SOURCES: dict[str, str] = {
     "NATURAL_RUBBER": "Ogden, Proc. R. Soc. A 326 (1972) 565, fitted to Treloar, Trans. Faraday Soc. 40 (1944) 59: "
     "vulcanised with 8 % of sulphur, without filler, slow tension to 7.6 times its length, equal tension of two axes "
     "to 4.5, shear; the bulk modulus is that of the default nu, lower than the real one",
-    "STEEL_304": "Frontan and others, Acta Mater. 60 (2012) 1353: annealed, rates of ballistic impacts",
+    "STEEL_304": "values in common use for annealed austenitic steel, not held against a measurement here",
     "STEEL_S235": "EN 10025-2: least yield stress, and tensile strength as true stress at the least uniform strain; "
     "rates after Cowper and Symonds (1957) for mild steel, small strains",
     "POLYCARBONATE": _GRADES,
@@ -95,8 +96,8 @@ SOURCES: dict[str, str] = {
     "PA66_MOIST": f"{_GRADES}; in balance with air of 50 % humidity",
     "EPDM_60": "Young's modulus 3.6 MPa of 60 Shore A by Gent, Trans. Inst. Rubber Ind. 34 (1958) 46: slow, to 1.5 "
     "times the length",
-    "EPP_30": "between data sheets of expanded polypropylene of 30 kg/m^3, by ISO 844 at 25, 50 and 75 %: slow; at "
-    "100 1/s some 30 % stronger",
+    "EPP_30": "typical of expanded polypropylene of 30 kg/m^3 at 25, 50 and 75 %, of no one data sheet: take that of "
+    "the grade; slow; stronger at higher rates",
     "STEEL_A36": "Schwer, 6th European LS-DYNA Users' Conference (2007), after Seidt and others: to 2000 1/s",
 }
 
