@@ -74,9 +74,7 @@ def test_odd_freedoms_are_refused(given, said):
 
 def test_phases_before_the_impact_and_contact_without_surface_are_refused():
     weld = mca.Weld(name="W", body="a")
-    with pytest.raises(
-        mca.RequestError, match=r"'Settle'\]: joints between whole bodies, as Weld W"
-    ):
+    with pytest.raises(mca.RequestError, match=r"'Settle'\]: joints between whole bodies, as Weld W"):
         scene_of(weld, phases=(mca.Settle(),))
     floor = mca.RigidPlane(point=(0.0, 0.0, 0.0), normal=(0.0, 0.0, 1.0))
     contact = mca.Contact(slave=mca.Surface(body="a", nodes="inertia"), master=floor)
