@@ -151,7 +151,7 @@ def body_in_itself(c: Finished, _: float) -> Iterator[Values]:
     "{one} and {other} overlap at the start, {how}, and no contact, joint or tie is between them: their masses "
     "count twice there, and nothing keeps them apart;",
     "move them apart, or bind them",
-    unit=f"as deep at most as flat faces explain, {SLACK:g} of their width and of the thickness of the bodies",
+    unit=f"as deep at most as flat faces explain, {SLACK:g} of the wider ones and of the thinner body",
     when=When.LOOKS,
 )
 def overlap_at_the_start(c: Finished, _: float) -> Iterator[Values]:
