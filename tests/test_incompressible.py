@@ -47,6 +47,31 @@ def test_a_strip_is_stretched_and_sheared(way: float, axis: str, closeness: floa
     assert found["energy"]["external_work"] == pytest.approx(plain["energy"]["external_work"], rel=closeness)
 
 
+def pressed(element: str, way: float) -> dict[str, float]:
+    """Energies of a block between bonded plates, pressed by a way [m]."""
+    block = mca.Box(size=(0.02, 0.01, 0.02), divisions=(6, 3, 6))
+    rubber = mca.Elastic(E=1e6, nu=0.48, rho=1000.0)
+    body = mca.Body(name="block", geometry=block, material=rubber, kinematics="finite", element=element)
+    held = (mca.Fixed(body="block", nodes="ymin"), mca.Fixed(body="block", nodes="ymax", axes="xz"))
+    times, share = np.linspace(0.0, 0.01, 11), np.linspace(0.0, 1.0, 11)
+    way_of = tuple(float(w) for w in -way * share**2 * (3.0 - 2.0 * share))
+    drive = mca.Prescribed(body="block", nodes="ymax", axis="y", times=tuple(times), displacements=way_of)
+    damped = (mca.Damping(body="block", mass=300.0, about="ground"),)
+    impact = mca.ImpactPhase(duration=0.011, output_interval=1e-4)
+    scene = mca.Scene(name="pressed", bodies=(body,), fixed=held, prescribed=(drive,), loads=damped, impact=impact)
+    found = mca.run(scene, device="cpu").summary
+    assert found["energy_error"] < 3e-3
+    return found["energy"]
+
+
+@pytest.mark.parametrize(("way", "closeness"), [(0.003, 0.12), (-0.003, 0.1)])
+def test_a_bonded_block_does_not_lock_where_vectors_have_faded(way: float, closeness: float):
+    """Its points have less of the bulk modulus to themselves there; with as much as before the force was twice."""
+    found, plain = (pressed(element, way) for element in ("hex8i", "hex8"))
+    stored = found["elastic"] + found["hourglass"]
+    assert stored == pytest.approx(plain["elastic"], rel=closeness)
+
+
 @pytest.mark.gpu
 def test_a_gpu_stretches_a_strip_alike():
     one, other = (pulled("hex8i", 0.02, "x", device).summary["energy"] for device in ("cpu", "cuda:0"))

@@ -68,7 +68,7 @@ def point_function(maker: Maker, precision: str, law_name: str, finite: bool) ->
     """
     form, point, place = parts_of(maker, precision, law_name, finite)
     struct, gradient, general, read = form.struct, form.gradient, point.general, point.read
-    own, (own_modulus, _) = form.pressure in (OWN, SPLIT), modulus_functions(precision, form.pressure == SPLIT)
+    own, (own_modulus, _) = form.pressure in (OWN, SPLIT), modulus_functions(form, precision)
     k, R, Point = law_kinematics(precision, law_name, finite), scalars(precision).real, point_type(precision)
     dilatation_of, deviator, pressure_of, cauchy, volume_strain = (
         k.dilatation,
@@ -98,7 +98,7 @@ def point_function(maker: Maker, precision: str, law_name: str, finite: bool) ->
         strain, N, d = deviator(H)
         if wp.static(own):
             theta = dilatation_of(H)
-            pressure = pressure + pressure_of(own_modulus(law[m, 0], law[m, 1]), theta)
+            pressure = pressure + pressure_of(own_modulus(shape, law[m, 0], law[m, 1]), theta)
         S, local, p, _stored, _spent = read(strain, theta, law[m, 1], place(g), e, m, flag, law, history)
         if wp.static(general):
             pressure = local
@@ -128,7 +128,7 @@ def failure_kernel(maker: Maker, failure: str, precision: str, law_name: str, fi
     form, _, _ = parts_of(maker, precision, law_name, finite)
     load = load_function(maker, precision, law_name, finite)
     points, corners, plastic = form.points, form.corners, bool(law_name)
-    _, mean_modulus = modulus_functions(precision, form.pressure == SPLIT)
+    _, mean_modulus = modulus_functions(form, precision)
     shared, seen = (make(maker, precision, law_name, finite) for make in (shared_function, point_function))
     damage, width = criterion(failure, precision)
     R, vec3, row = scalars(precision).real, scalars(precision).vec3, parameter_type(precision, width)
@@ -165,7 +165,7 @@ def failure_kernel(maker: Maker, failure: str, precision: str, law_name: str, fi
             if wp.static(plastic):
                 flag = yielded[e]
             shape = load(X, u, conn, e, m, flag, law, history)
-            K = mean_modulus(law[m, 0], law[m, 1])
+            K = mean_modulus(shape, law[m, 0], law[m, 1])
             theta, pressure, _energy = shared(shape, e, K, R(0.0), group, dilatation)
             c = row()
             for i in range(wp.static(width)):

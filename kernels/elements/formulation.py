@@ -20,7 +20,8 @@ from warp_mca.kernels.records.extremes import keep_functions
 wp.set_module_options({"enable_backward": False})
 
 OWN, MEAN, NODAL, SPLIT = "own", "mean", "nodal", "split"
-OWN_SHARE = 25.0  # greatest K / G that points of a SPLIT pressure have to themselves: nu = 0.4803
+# Greatest K / G that points of a SPLIT pressure have to themselves, with internal vectors and without: nu = 0.480, 0.35
+OWN_SHARE, OWN_ALONE = 25.0, 3.0
 
 
 @dataclass(frozen=True)
@@ -31,8 +32,8 @@ class Formulation:
         name: of the element.
         corners, points: numbers of its nodes and of its integration points.
         pressure: from which change of volume it comes: OWN of each point, MEAN of the element, NODAL of the pressure
-            nodes of each corner, which `ElementStage.nodal` gives; SPLIT, OWN with the K of `modulus_functions` and
-            MEAN with the rest.
+            nodes of each corner, which `ElementStage.nodal` gives; SPLIT, OWN with the K that `split` gives and MEAN
+            with the rest.
         struct: what the functions below need of an element.
         load: (X, u, conn, e) -> struct.
         gradient: (struct, g) -> (volume of point g [m^3], displacement gradient there in the element's frame).
@@ -46,6 +47,7 @@ class Formulation:
         modes: (struct, K, G, flag, history, e) -> (stored, dissipated) energy of what deforms without strain at the
             points [J]; None where nothing does.
         lags: whether internal vectors lag behind: their extremes have a row LAG_LOSS, the energy that this took [J].
+        split: (struct, K, G) -> bulk modulus of a point's own change of volume [Pa], where the pressure is SPLIT.
     """
 
     name: str
@@ -63,27 +65,40 @@ class Formulation:
     enriched: Any = None
     modes: Any = None
     lags: bool = False
+    split: Any = None
 
 
 Maker = Callable[[str, str, bool], Formulation]  # of a precision, a law, and whether strains may be large
 
 
 @cache
-def modulus_functions(precision: str, splits: bool) -> tuple[Any, Any]:
-    """Functions (K, G) -> bulk modulus of a point's own change of volume, and of the mean one [Pa]; all of K, each,
-    where the pressure is not split."""
-    R = scalars(precision).real
+def own_modulus_function(precision: str) -> Any:
+    """The function (K, G, share) -> bulk modulus of a point's own change of volume [Pa], where a share of the internal
+    vectors is left. Without these, points with a large K of their own would lock, as in an element of displacements."""
+    R, by_vectors = scalars(precision).real, OWN_SHARE - OWN_ALONE
 
     @wp.func
-    def own_modulus(K: R, G: R):
+    def own_modulus(K: R, G: R, share: R):
+        return wp.min(K, (R(OWN_ALONE) + share * R(by_vectors)) * G)
+
+    return own_modulus
+
+
+def modulus_functions(form: Formulation, precision: str) -> tuple[Any, Any]:
+    """Functions (struct, K, G) -> bulk modulus of a point's own change of volume, and of the mean one [Pa]; all of K,
+    each, where the pressure is not split."""
+    R, struct, splits, split = scalars(precision).real, form.struct, form.pressure == SPLIT, form.split
+
+    @wp.func
+    def own_modulus(shape: struct, K: R, G: R):
         if wp.static(splits):
-            return wp.min(K, R(OWN_SHARE) * G)
+            return split(shape, K, G)
         return K
 
     @wp.func
-    def mean_modulus(K: R, G: R):
+    def mean_modulus(shape: struct, K: R, G: R):
         if wp.static(splits):
-            return K - wp.min(K, R(OWN_SHARE) * G)
+            return K - split(shape, K, G)
         return K
 
     return own_modulus, mean_modulus

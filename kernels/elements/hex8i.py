@@ -11,7 +11,7 @@ import warp as wp
 
 from warp_mca.kernels.elements import hex8i_points, hex8i_vectors
 from warp_mca.kernels.elements.failure import failure_kernel
-from warp_mca.kernels.elements.formulation import OWN, SPLIT, Formulation, modulus_functions
+from warp_mca.kernels.elements.formulation import OWN, SPLIT, Formulation, own_modulus_function
 from warp_mca.kernels.elements.hex8i_small import elastic_function, plastic_tractions_function, stress_function
 from warp_mca.kernels.elements.hexahedron import load_function, store_function
 from warp_mca.kernels.elements.internal_modes import mode_functions, place_functions
@@ -117,7 +117,7 @@ def formulation(points: int, precision: str, law_name: str, finite: bool) -> For
     read_vectors, _ = hex8i_vectors.vector_functions(precision, law_name, points)
     plastic_tractions = plastic_tractions_function(precision, law_name, points)
     splits = hex8i_points.splits(precision, law_name, finite)
-    own_modulus, _ = modulus_functions(precision, splits)
+    own_modulus = own_modulus_function(precision)
 
     @wp.struct
     class Hex8i:
@@ -129,6 +129,7 @@ def formulation(points: int, precision: str, law_name: str, finite: bool) -> For
             W, H: rotation less I, mean displacement gradient [-].
             L0, L1, L2: parts of the gradient that are linear in a natural coordinate [-].
             N0, N1, N2: parts with the product of the two others [-].
+            share: what is left of the internal vectors [-].
         """
 
         x: mat73
@@ -142,6 +143,7 @@ def formulation(points: int, precision: str, law_name: str, finite: bool) -> For
         N0: mat33
         N1: mat33
         N2: mat33
+        share: R
 
     @wp.func
     def load_shape(X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), conn: wp.array2d(dtype=wp.int32), e: int):
@@ -159,11 +161,13 @@ def formulation(points: int, precision: str, law_name: str, finite: bool) -> For
     def enriched(shape: Hex8i, e: int, m: int, flag: int, law: wp.array2d(dtype=R), history: wp.array2d(dtype=R)):
         y = frame(shape.x)
         G = law[m, 1]
-        K = own_modulus(law[m, 0], G)
+        K = R(law[m, 0])
         c = mat33()
         share = R(1.0)
         if wp.static(by_points):
             c, share = read_vectors(history, e)
+        if wp.static(splits):
+            K = own_modulus(law[m, 0], G, R(1.0))
         if wp.static(plastic and not by_points):
             n0, n1, n2 = plastic_tractions(y, e, history)
             c[0] = solve(G * n0, y[0], K, G)
@@ -176,7 +180,12 @@ def formulation(points: int, precision: str, law_name: str, finite: bool) -> For
         shape.N0 = N0
         shape.N1 = N1
         shape.N2 = N2
+        shape.share = share
         return shape
+
+    @wp.func
+    def split(shape: Hex8i, K: R, G: R):
+        return own_modulus(K, G, shape.share)
 
     @wp.func
     def gradient(shape: Hex8i, g: int):
@@ -197,7 +206,7 @@ def formulation(points: int, precision: str, law_name: str, finite: bool) -> For
 
     given = (SPLIT if splits else OWN, Hex8i, load_shape, gradient, rotation, 1, corner_of)
     lag = lags(law_functions(law_name, precision), finite)
-    return Formulation("hex8i", 8, points, *given, enriched=enriched, lags=lag)
+    return Formulation("hex8i", 8, points, *given, enriched=enriched, lags=lag, split=split)
 
 
 def kernels(points: int) -> SimpleNamespace:

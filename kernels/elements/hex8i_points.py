@@ -14,7 +14,7 @@ objective, and angular momentum is kept.
 Vectors do not take what J varies by in second order. Near incompressibility K would hold this: cells lock as they
 stretch, and vectors that lag make them unstable. At finite strain points have a K of `OWN_SHARE` G at most to
 themselves, as vectors do; the rest goes with the mean of J - 1, as in `hex8`. Bending is 1 % too soft by this at
-nu = 0.5.
+nu = 0.5. Where vectors fade, it falls to `OWN_ALONE` G; what this frees counts as taken by the lag.
 """
 
 from functools import cache
@@ -22,7 +22,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.elements.formulation import modulus_functions
+from warp_mca.kernels.elements.formulation import OWN_ALONE, own_modulus_function
 from warp_mca.kernels.elements.hex8i_small import internal_function
 from warp_mca.kernels.elements.hex8i_vectors import closed_form_function, corrected_function, vector_functions
 from warp_mca.kernels.elements.internal_modes import mode_functions, place_functions
@@ -87,15 +87,15 @@ def varying_function(precision: str, finite: bool) -> Any:
 
 @cache
 def sums_function(precision: str, law_name: str, finite: bool, points: int) -> Any:
-    """The function that goes through the points of an element: stress sums, greatest e : e and S : S, new flag.
+    """The function that goes through the points of an element.
 
-    Sums of w_g P: by themselves; times each natural coordinate; times the product of the two others.
+    It gives sums of w_g P: by themselves; times each natural coordinate; times the product of the two others. Then the
+    greatest e : e and S : S, the new flag, and the mean of ln(J)^2 / 2 beyond that of the mean J, where K is split.
     """
     R, mat33 = scalars(precision).real, scalars(precision).mat33
     column_place, layer_place, layer_count = *place_functions(precision, points), points // 4
     point = material_point(precision, law_name, finite, points)
     general, update, has_mean = point.general, point.update, splits(precision, law_name, finite)
-    own_modulus, mean_modulus = modulus_functions(precision, has_mean)
     k = law_kinematics(precision, law_name, finite)
     dilatation_of, deviator, pressure_of, nominal = k.dilatation, k.deviator, k.pressure, k.nominal
 
@@ -120,6 +120,7 @@ def sums_function(precision: str, law_name: str, finite: bool, points: int) -> A
         N0: mat33,
         N1: mat33,
         N2: mat33,
+        K: R,
         e: int,
         m: int,
         flag: int,
@@ -128,11 +129,11 @@ def sums_function(precision: str, law_name: str, finite: bool, points: int) -> A
         history_out: wp.array2d(dtype=R),
     ):
         G = law[m, 1]
-        K = own_modulus(law[m, 0], G)
-        shared = R(0.0)
+        shared, mean_theta, variance = R(0.0), R(0.0), R(0.0)
         if wp.static(has_mean):
-            if K < law[m, 0]:
-                shared = pressure_of(mean_modulus(law[m, 0], G), mean_dilatation(H, L0, L1, L2, N0, N1, N2))
+            if law[m, 0] > R(OWN_ALONE) * G:
+                mean_theta = mean_dilatation(H, L0, L1, L2, N0, N1, N2)
+                shared = pressure_of(law[m, 0] - K, mean_theta)
         flag_new = flag
         mean = mat33()
         R0, R1, R2 = mat33(), mat33(), mat33()
@@ -154,6 +155,8 @@ def sums_function(precision: str, law_name: str, finite: bool, points: int) -> A
                 S, pressure, dp = update(strain, theta, G, g, e, m, flag, law, dt, history_out)
                 if dp > R(0.0):
                     flag_new = int(1)
+                if wp.static(has_mean):
+                    variance += weight * (theta - mean_theta) * (theta - mean_theta)
                 if wp.static(not general):
                     pressure = shared + pressure_of(K, theta)
                     stress2 = wp.max(stress2, wp.ddot(S, S))
@@ -167,7 +170,10 @@ def sums_function(precision: str, law_name: str, finite: bool, points: int) -> A
             M0 = M0 + eta * moment
             M1 = M1 + xi * moment
             M2 = M2 + (xi * eta) * total
-        return mean, R0, R1, R2, M0, M1, M2, largest, stress2, flag_new
+        # of ln(J)^2 / 2, beyond that of its mean
+        J = R(1.0) + mean_theta
+        excess = R(0.5) * variance * (R(1.0) - mean_theta) / (J * J)
+        return mean, R0, R1, R2, M0, M1, M2, largest, stress2, flag_new, excess
 
     return point_sums
 
@@ -185,7 +191,7 @@ def stress_function(precision: str, law_name: str, finite: bool, points: int) ->
     closed_form, corrected = closed_form_function(precision), corrected_function(precision, law_name, finite)
     read_vectors, write_vectors = vector_functions(precision, law_name, points)
     point_sums, plastic = sums_function(precision, law_name, finite, points), bool(law_name)
-    own_modulus, _ = modulus_functions(precision, splits(precision, law_name, finite))
+    own_modulus, has_mean = own_modulus_function(precision), splits(precision, law_name, finite)
 
     @wp.func
     def conjugate(R0: mat33, R1: mat33, R2: mat33, y: mat33, last: vec3):
@@ -211,14 +217,18 @@ def stress_function(precision: str, law_name: str, finite: bool, points: int) ->
         history_out: wp.array2d(dtype=R),
     ):
         G = law[m, 1]
-        K = own_modulus(law[m, 0], G)
+        K = R(law[m, 0])
+        own = R(law[m, 0])
         flag = int(0)
         if wp.static(plastic):
             flag = yielded_out[e]
         c, share = read_vectors(history_out, e)
+        if wp.static(has_mean):
+            K = own_modulus(law[m, 0], G, R(1.0))
+            own = own_modulus(law[m, 0], G, share)
         F, inverse, Y, a, L0, L1, L2, N0, N1, N2, last, z = varying(x, H, q, y, c, share, K, G)
-        mean, R0, R1, R2, M0, M1, M2, largest, stress2, flag_new = point_sums(
-            H, L0, L1, L2, N0, N1, N2, e, m, flag, law, dt, history_out
+        mean, R0, R1, R2, M0, M1, M2, largest, stress2, flag_new, excess = point_sums(
+            H, L0, L1, L2, N0, N1, N2, own, e, m, flag, law, dt, history_out
         )
         if wp.static(plastic):
             if flag_new != flag:
@@ -233,6 +243,8 @@ def stress_function(precision: str, law_name: str, finite: bool, points: int) ->
         change, c, kept = corrected(F, c, a, S, share, stress2, G)
         write_vectors(history_out, e, c, kept)
         lost = -volume * (wp.dot(r0, change[0]) + wp.dot(r1, change[1]) + wp.dot(r2, change[2]))
+        if wp.static(has_mean):
+            lost += volume * (own - own_modulus(law[m, 0], G, kept)) * excess
         D0 = normal(y[0])
         D1 = normal(y[1])
         D2 = normal(y[2])

@@ -131,7 +131,7 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
     load = load_function(maker, precision, law_name, finite)
     gradient, rotation, modes, points = form.gradient, form.rotation, form.modes, form.points
     shared, own = shared_function(maker, precision, law_name, finite, heated), form.pressure in (OWN, SPLIT)
-    own_modulus, mean_modulus = modulus_functions(precision, form.pressure == SPLIT)
+    own_modulus, mean_modulus = modulus_functions(form, precision)
     swelling_of, elastic_dilatation = swelling_functions(precision, finite, heated)
     plastic, general, read = bool(law_name), point.general, point.read
     has_modes, lags = form.modes is not None, form.lags
@@ -184,12 +184,13 @@ def energy_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
             S, _pressure, p, stored, spent = read(strain, theta, G, place(g), e, m, flag, law, history)
             keep_peaks(e, g, H, S, N, d, p, peak_out)
             if wp.static(own and not general):
-                stored += volumetric_energy(own_modulus(K, G), elastic_dilatation(theta, swelling))
+                stored += volumetric_energy(own_modulus(shape, K, G), elastic_dilatation(theta, swelling))
             elastic += weight * stored
             dissipated += weight * spent
             smallest = wp.min(smallest, wp.determinant(identity + H))
         if wp.static(late):
-            elastic += volume * volumetric_energy(mean_modulus(K, G), elastic_dilatation(growth / volume, swelling))
+            theta = elastic_dilatation(growth / volume, swelling)
+            elastic += volume * volumetric_energy(mean_modulus(shape, K, G), theta)
         energy_out[0, first + e] = elastic
         energy_out[2, first + e] = wp.sqrt(R(2.0) / R(3.0) * largest)
         smallest = smallest * wp.determinant(identity + rotation(shape))
@@ -217,7 +218,7 @@ def stress_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
     gradient, rotation, corner_of = form.gradient, form.rotation, form.corner_of
     points, corners, shown = form.points, form.corners, form.shown
     shared, own = shared_function(maker, precision, law_name, finite), form.pressure in (OWN, SPLIT)
-    own_modulus, mean_modulus = modulus_functions(precision, form.pressure == SPLIT)
+    own_modulus, mean_modulus = modulus_functions(form, precision)
     plastic, general, read = bool(law_name), point.general, point.read
     k, R = law_kinematics(precision, law_name, finite), scalars(precision).real
     dilatation_of, deviator, pressure_of, cauchy = k.dilatation, k.deviator, k.pressure, k.cauchy
@@ -246,7 +247,7 @@ def stress_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
             flag = yielded[e]
         shape = load(X, u, conn, e, m, flag, law, history)
         Q = wp.identity(n=3, dtype=R) + rotation(shape)
-        theta, mean_pressure, _energy = shared(shape, e, mean_modulus(K, law[m, 1]), R(0.0), group, dilatation)
+        theta, mean_pressure, _energy = shared(shape, e, mean_modulus(shape, K, law[m, 1]), R(0.0), group, dilatation)
         for g in range(wp.static(points)):
             _weight, H = gradient(shape, g)
             strain, N, d = deviator(H)
@@ -256,7 +257,7 @@ def stress_kernel(maker: Maker, precision: str, law_name: str, finite: bool = Fa
             if wp.static(not general):
                 pressure = mean_pressure
                 if wp.static(own):
-                    pressure = mean_pressure + pressure_of(own_modulus(K, law[m, 1]), theta)
+                    pressure = mean_pressure + pressure_of(own_modulus(shape, K, law[m, 1]), theta)
             local = cauchy(H, S, N, d, pressure)
             sigma = Q * local * wp.transpose(Q)
             for j in range(wp.static(shown)):
