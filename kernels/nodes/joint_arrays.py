@@ -110,6 +110,7 @@ class JointStep:
         worst: greatest opening of each group [m/s], shape (group_count,), float64.
         work, heat, kinetic, stored: energies at t(n) [J], shape (rate_count,), float64.
         load, effort, seen: impulse, drive and position at t(n), as in `JointPoses`.
+        pace: rate at t(n), the mean of both half steps around it [rad/s], [m/s], shape (rate_count,), float64.
     """
 
     screw: wp.array(dtype=Twist)
@@ -131,3 +132,4 @@ class JointStep:
     load: wp.array(dtype=wp.float64)
     effort: wp.array(dtype=wp.float64)
     seen: wp.array(dtype=wp.float64)
+    pace: wp.array(dtype=wp.float64)

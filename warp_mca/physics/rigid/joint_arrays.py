@@ -134,7 +134,7 @@ class JointArrays:
         step.worst = wp.zeros(groups, dtype=wp.float64)
         for name in ("change", "ahead", "behind", "torque", "drag", "hold"):
             setattr(step, name, wp.zeros(rates, dtype=wp.float64))
-        for name in ("work", "heat", "kinetic", "stored", "effort", "seen"):
+        for name in ("work", "heat", "kinetic", "stored", "effort", "seen", "pace"):
             setattr(step, name, wp.zeros(rates, dtype=wp.float64))
         self.step = step
 
