@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
+from test_advice import alone
+from warning_pairs import joined_cubes
+from watched import told_of
 
 import warp_mca as mca
 from warp_mca.verify.body_joints import INERTIA, link, mujoco_positions, pendulum_chain, worlds
+from warp_mca.watch import meshes
 
 ROWS = (5, 20, 200)
 
@@ -62,3 +66,79 @@ def test_an_asymmetric_top_tumbles_alike_in_few_and_many_rows():
         assert (Rotation.from_rotvec(end["rotation"]) * turned.inv()).magnitude() < 2e-3
         assert end["spin"] == pytest.approx(J * w, rel=1e-12)
         assert result["E_kinetic"][0] == pytest.approx(0.5 * J @ w**2, rel=1e-4)
+
+
+def told(bodies, joints, duration: float, **more) -> list[str]:
+    """What a run of a machine says of it."""
+    impact = mca.ImpactPhase(duration=duration, output_interval=duration / 10, **more)
+    scene = mca.Scene(name="machine", bodies=tuple(bodies), joints=tuple(joints), impact=impact)
+    return list(mca.run(scene, device="cpu").warnings)
+
+
+def test_freedoms_that_become_one_are_told_with_joint_and_time():
+    """Three hinges of a ball that turns by pi / 2 about the middle one at 10 rad/s, and by 1 rad."""
+    body = link("r", centre=(0.0, 0.0, 0.0), inertia=(0.1, 0.1, 0.1), angular_velocity=(0.0, 10.0, 0.0))
+    axes = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
+    joint = mca.Articulation(name="G", body="r", freedoms=tuple(mca.Freedom(axis=axis) for axis in axes))
+    (said,) = told((body,), (joint,), 0.2)
+    assert "joint G came near a pose in which two of its freedoms make the same motion, at t = 0.1571 s" in said
+    assert told((body,), (joint,), 0.1) == []
+
+
+def test_a_loop_at_a_dead_point_is_told_with_joint_and_time():
+    """A parallelogram whose crank starts at 1 rad at 10 rad/s: it is flat at pi, after 0.2142 s."""
+    c, s = np.cos(1.0), np.sin(1.0)
+    own = {"mass": 1.0, "inertia": (0.001, 0.01, 0.01)}
+    crank = own | {"rotation": (0.0, 0.0, 1.0), "angular_velocity": (0.0, 0.0, 10.0), "centre": (0.1, 0.0, 0.0)}
+    bodies = (
+        link("crank", **crank),
+        link("coupler", (0.2 * c, 0.2 * s, 0.0), centre=(0.25, 0.0, 0.0), velocity=(-2.0 * s, 2.0 * c, 0.0), **own),
+        link("rocker", (0.5, 0.0, 0.0), **crank),
+    )
+    pin = {"nodes": None, "axis": (0.0, 0.0, 1.0), "at": (0.0, 0.0, 0.0)}
+    joints = (
+        mca.Revolute(name="O", body="crank", **pin),
+        mca.Revolute(name="P", body="coupler", other="crank", other_at=(0.2, 0.0, 0.0), **pin),
+        mca.Revolute(name="D", body="rocker", **pin),
+        mca.Revolute(name="Q", body="coupler", other="rocker", other_at=(0.2, 0, 0), **pin | {"at": (0.5, 0.0, 0.0)}),
+    )
+    (said,) = told(bodies, joints, 0.25)
+    assert "joint O and those that close a loop with it came to a dead point at t = 0.214" in said
+    assert told(bodies, joints, 0.2) == []
+
+
+def test_a_body_that_turns_too_far_in_a_step_is_told_with_the_scale_that_helps():
+    motor = mca.Amplitude(times=(0.0,), values=(10.0,))
+    joint = mca.Articulation(name="J", body="b", freedoms=(mca.Freedom(motor=motor),))
+    body = link("b", centre=(0.0, 0.0, 0.0), inertia=(0.1, 0.1, 0.1))
+    (said,) = told((body,), (joint,), 1.0)
+    assert "body b turned by 0.089 rad in a step, which makes angles some 0.001 of themselves wrong" in said
+    assert "set time_step_scale to 0.2" in said and told((body,), (joint,), 1.0, time_step_scale=0.2) == []
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (
+            lambda: mca.Freedom(limits=(0.0, 1.0), limit_stiffness=0.0),
+            "limit_stiffness = 0.0: springs of limits need a",
+        ),
+        (
+            lambda: mca.Contact(slave=mca.Surface(body="a", nodes="b"), master=mca.RigidPlane(), stiffness=1e20),
+            "Contact.stiffness = 1e+20: give a number from 0 to 1e+12",
+        ),
+    ],
+)
+def test_stiffnesses_that_nobody_means_are_refused(make, said):
+    with pytest.raises(mca.RequestError) as error:
+        make()
+    assert said in str(error.value)
+
+
+def test_pieces_of_a_rigid_body_stay_together():
+    found = []
+    for rigid in (False, True):
+        scene = alone(joined_cubes((0.015, 0.005, 0.005)))
+        scene = replace(scene, bodies=tuple(replace(body, rigid=rigid) for body in scene.bodies))
+        found.append(len(told_of(meshes.loose_pieces, scene)))
+    assert found == [1, 0]

@@ -77,6 +77,8 @@ class JointPoses:
         drive: of the motor of each rate so far [N m s], [N s], shape (rate_count,), float64.
         clock: steps that each joint has taken [-], shape (joint_count,), int32.
         held: torque of each motor that is HELD [N m], [N], shape (rate_count,), float64.
+        alone: least part of a rate's screw that others do not make, and its step [-], shape (joint_count,), vec2d.
+        rank: of a group's rows, at its first joint, see there [-], shape (joint_count,), vec4d.
     """
 
     position: wp.array(dtype=wp.float64)
@@ -88,6 +90,8 @@ class JointPoses:
     drive: wp.array(dtype=wp.float64)
     clock: wp.array(dtype=wp.int32)
     held: wp.array(dtype=wp.float64)
+    alone: wp.array(dtype=wp.vec2d)
+    rank: wp.array(dtype=wp.vec4d)
 
 
 @wp.struct

@@ -61,6 +61,34 @@ def place_joints(
 
 
 @wp.func
+def note_rank(k: int, rows: RigidRows, poses_out: Poses, step: RigidStep):
+    """Keep how near joints of group k have come to a pose in which their rows hold fewer motions, see `JointState`."""
+    if rows.joints.begin[k] == rows.joints.begin[k + 1]:
+        return
+    j = rows.joints.member[rows.joints.begin[k]]
+    rank = wp.float64(0.0)
+    least = wp.float64(1.0)
+    for r in range(rows.begin[k], rows.begin[k + 1]):
+        share = step.share[r]
+        if rows.rate[r] < 0 and share > wp.float64(0.0):
+            rank += wp.float64(1.0)
+            least = wp.min(least, share)
+    own = poses_out.joints.rank[j]
+    clock = wp.float64(poses_out.joints.clock[j])
+    if own[0] == wp.float64(0.0):
+        own = wp.vec4d(rank, least, wp.float64(1.0), clock)
+    near = least / own[1]
+    if rank != own[0]:
+        near = wp.float64(0.0)
+        if rank > own[0]:  # it was so until now
+            own[0] = rank
+    if near < own[2]:
+        own[2] = near
+        own[3] = clock
+    poses_out.joints.rank[j] = own
+
+
+@wp.func
 def jointed_lightness(r: int, s: int, bodies: RigidBodies, rows: RigidRows, moves: bool, step: RigidStep) -> wp.float64:
     """Entry of a group's matrix, see `rigid_rows.row_lightness`; rows of rates give way as `joint_drives` says."""
     e = rows.rate[r]

@@ -27,6 +27,7 @@ from warp_mca.step.state_figures import (
     max_plastic_strain,
     max_speed,
     rigid_bodies,
+    rigid_extremes,
 )
 from warp_mca.watch.energy import spring_shares
 from warp_mca.watch.failure_report import failure_report
@@ -285,6 +286,7 @@ class SceneRun:
             bent=self.ledger.kept.stiffened if stopped else self.looks.bent(u),
             watch=self.looks.watch,
             stopped=stopped,
+            rigid=rigid_extremes(self.solver, self.state, self.index),
             **found,
         )
         return told_at_the_end(finished, ready.warnings)

@@ -10,6 +10,7 @@ import numpy as np
 
 from warp_mca.base.arrays import Array
 from warp_mca.base.rotation import mean_pose, rotation_vector
+from warp_mca.watch.articulations import RigidExtremes
 
 if TYPE_CHECKING:
     from warp_mca.step.solver import Solver
@@ -76,6 +77,16 @@ def rigid_bodies(model: Model, u: Array, v: Array) -> dict[str, dict[str, object
             "spin": (m @ np.cross(x - centre, w)).tolist(),
         }
     return found
+
+
+def rigid_extremes(solver: Solver, state: State, scene: int) -> RigidExtremes | None:
+    """What single steps say of the rigid bodies of a scene, for warnings; None without such bodies."""
+    bodies = [body.scene == scene for body in solver.model.rigid_bodies]
+    if not any(bodies):
+        return None
+    joints, own = np.array([item.scene == scene for item in solver.model.body_joints], dtype=bool), state.rigid.joints
+    alone, rank = (own.alone.numpy()[joints], own.rank.numpy()[joints]) if own else (np.zeros((0, 2)), np.zeros((0, 4)))
+    return RigidExtremes(dt=solver.nodes.dt, turn=state.rigid.turn.numpy()[bodies], alone=alone, rank=rank)
 
 
 def flexible_bodies(model: Model, u: Array, v: Array, names: Sequence[str]) -> dict[str, dict[str, object]]:
