@@ -23,6 +23,7 @@ from watched import history, ledger, of_contacts, told, told_of
 
 import warp_mca as mca
 from warp_mca.geometry import Mesh
+from warp_mca.system.rigid import RigidExtremes
 from warp_mca.verify.body_joints import pendulum_chain
 from warp_mca.watch import (
     articulations,
@@ -327,7 +328,7 @@ def _(beyond: bool) -> list[str]:
 def turned(row: Row, **more: Any) -> list[str]:
     """What a row says of extremes of a body on a hinge."""
     own = {"dt": 1e-3, "turn": np.zeros(1), "alone": np.ones((1, 2)), "rank": np.ones((1, 4))} | more
-    return told_of(row, pendulum_chain(1, 10), rigid=articulations.RigidExtremes(**own))
+    return told_of(row, pendulum_chain(1, 10), rigid=RigidExtremes(**own))
 
 
 @pair(articulations.fast_turn)

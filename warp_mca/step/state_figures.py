@@ -10,7 +10,7 @@ import numpy as np
 
 from warp_mca.base.arrays import Array
 from warp_mca.base.rotation import mean_pose, rotation_vector
-from warp_mca.watch.articulations import RigidExtremes
+from warp_mca.system.rigid import RigidExtremes
 
 if TYPE_CHECKING:
     from warp_mca.step.solver import Solver

@@ -3,29 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
-from warp_mca.base.arrays import Array
 from warp_mca.kernels.nodes.joint_arrays import HIGH, LIMIT_STIFFNESS, LOW, SLIDE
 from warp_mca.watch.row import Context, Finished, Values, When, row
-
-
-@dataclass(frozen=True, kw_only=True)
-class RigidExtremes:
-    """What single steps of a run say of rigid bodies of a scene and of joints between whole bodies.
-
-    Attributes:
-        dt: step of bodies and joints [s].
-        turn: greatest turn of each body in a step [rad], shape (body_count,), float64.
-        alone, rank: as in `JointState`, shapes (joint_count, 2) and (joint_count, 4), float64; empty without joints.
-    """
-
-    dt: float
-    turn: Array
-    alone: Array
-    rank: Array
 
 
 @row(

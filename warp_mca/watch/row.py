@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from warp_mca.scene import Scene
     from warp_mca.system.contact import ContactPass
     from warp_mca.system.model import Model
-    from warp_mca.watch.articulations import RigidExtremes
+    from warp_mca.system.rigid import RigidExtremes
     from warp_mca.watch.ledger import Ledger
     from warp_mca.watch.passing import Watch
 
