@@ -14,6 +14,8 @@ from warp_mca.kernels.nodes.rigid_pins import move_pin
 from warp_mca.kernels.nodes.rigid_rows import SOLVES, RigidRows, give_impulses, opening, row_lightness
 from warp_mca.kernels.nodes.symmetric import solve_factorised
 
+SURE = 1e-7  # share of a row that counts as held by it alone: axes of a loop may be 3e-4 rad off
+
 
 @wp.func
 def move_bodies(
@@ -70,7 +72,7 @@ def note_rank(k: int, rows: RigidRows, poses_out: Poses, step: RigidStep):
     least = wp.float64(1.0)
     for r in range(rows.begin[k], rows.begin[k + 1]):
         share = step.share[r]
-        if rows.rate[r] < 0 and share > wp.float64(0.0):
+        if rows.rate[r] < 0 and share > wp.float64(SURE):
             rank += wp.float64(1.0)
             least = wp.min(least, share)
     own = poses_out.joints.rank[j]
