@@ -162,6 +162,17 @@ def test_meshes_that_do_not_fit_the_file_are_refused_with_figures(tmp_path, tool
         arm(tmp_path, text, flexible={"tool": TOOL}).swing()
 
 
+def test_a_mesh_beside_its_link_is_refused_by_its_place(tmp_path):
+    """Of the same mass as the link, and lighter than it."""
+    for heavy in (False, True):
+        text = ARM.replace('mass="0.24832"', 'mass="0.5"').replace("0.000007893", "0.00005") if heavy else ARM
+        text = text.replace("0.0005166 0.0005166", "0.0013 0.0013") if heavy else text
+        aside = replace(TOOL, position=(0.3, 0.0, 0.0))
+        said = r"mass centre of the mesh of link tool \[m\] = '\(0\.3, .*the link at \(0, 0, 0\.07868\), in the link's"
+        with pytest.raises(mca.RequestError, match=said):
+            arm(tmp_path, text, flexible={"tool": aside}).swing()
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [

@@ -200,6 +200,10 @@ def test_what_a_machine_does_not_carry_is_refused_by_name(tmp_path, text, what):
         ({"controller": lambda t, q, v: [1.0], "period": 0.01}, "0 finite numbers"),
         ({"period": 0.01}, "Robot.period"),
         ({"against": ("table",)}, "Robot.against"),
+        (
+            {"against": (mca.Body(name="m", rigid=True, mass=1.0, inertia=(1, 1, 1), centre=(0, 0, 0)),)},
+            "Robot.against = 'm': it is a mass without surface; give it a geometry",
+        ),
     ],
 )
 def test_mistakes_are_refused_in_a_sentence(tmp_path, more, what):
@@ -210,6 +214,8 @@ def test_mistakes_are_refused_in_a_sentence(tmp_path, more, what):
 def test_mistakes_of_files_and_touches_are_refused(tmp_path):
     with pytest.raises(RequestError, match="there is no such file"):
         mca.Robot(tmp_path / "none.xml").swing()
+    with pytest.raises(RequestError, match="this is a folder; name a file in it"):
+        mca.Robot(tmp_path).swing()
     with pytest.raises(RequestError, match="give an MJCF file"):
         mca.Robot(tmp_path / "none.step").swing()
     with pytest.raises(RequestError, match="MuJoCo says"):

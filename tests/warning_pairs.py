@@ -23,7 +23,10 @@ from watched import history, ledger, of_contacts, told, told_of
 
 import warp_mca as mca
 from warp_mca.geometry import Mesh
+from warp_mca.system.rigid import RigidExtremes
+from warp_mca.verify.body_joints import pendulum_chain
 from warp_mca.watch import (
+    articulations,
     bending,
     contacts,
     elements,
@@ -312,6 +315,35 @@ def _(beyond: bool) -> list[str]:
     scene = alone(cube(2), angular_velocity=(0.0, angle, 0.0))
     scene = replace(scene, fixed=(mca.Fixed(body="it", nodes="ymin"),))
     return told_of(motion.stretched_set, scene, ledger=ledger(steps=SimpleNamespace(dt=1e-3)), steps_taken=1000)
+
+
+@pair(articulations.start_beyond_limits)
+def _(beyond: bool) -> list[str]:
+    over_limit = over(articulations.start_beyond_limits, beyond) * 2.0
+    freedom = mca.Freedom(limits=(-1.0, 1.0), position=1.0 + over_limit)
+    joint = mca.Articulation(name="J", body="b0", freedoms=(freedom,))
+    return told_of(articulations.start_beyond_limits, replace(pendulum_chain(1, 10), joints=(joint,)))
+
+
+def turned(row: Row, **more: Any) -> list[str]:
+    """What a row says of extremes of a body on a hinge."""
+    own = {"dt": 1e-3, "turn": np.zeros(1), "alone": np.ones((1, 2)), "rank": np.ones((1, 4))} | more
+    return told_of(row, pendulum_chain(1, 10), rigid=RigidExtremes(**own))
+
+
+@pair(articulations.fast_turn)
+def _(beyond: bool) -> list[str]:
+    return turned(articulations.fast_turn, turn=np.array([over(articulations.fast_turn, beyond)]))
+
+
+@pair(articulations.freedoms_alike)
+def _(beyond: bool) -> list[str]:
+    return turned(articulations.freedoms_alike, alone=np.array([[under(articulations.freedoms_alike, beyond), 3.0]]))
+
+
+@pair(articulations.dead_point)
+def _(beyond: bool) -> list[str]:
+    return turned(articulations.dead_point, rank=np.array([[5.0, 0.1, under(articulations.dead_point, beyond), 3.0]]))
 
 
 @pair(meshes.slender_rods)

@@ -77,6 +77,8 @@ class JointPoses:
         drive: of the motor of each rate so far [N m s], [N s], shape (rate_count,), float64.
         clock: steps that each joint has taken [-], shape (joint_count,), int32.
         held: torque of each motor that is HELD [N m], [N], shape (rate_count,), float64.
+        alone: least part of a rate's screw that others do not make, and its step [-], shape (joint_count,), vec2d.
+        rank: of a group's rows, at its first joint, see there [-], shape (joint_count,), vec4d.
     """
 
     position: wp.array(dtype=wp.float64)
@@ -88,6 +90,8 @@ class JointPoses:
     drive: wp.array(dtype=wp.float64)
     clock: wp.array(dtype=wp.int32)
     held: wp.array(dtype=wp.float64)
+    alone: wp.array(dtype=wp.vec2d)
+    rank: wp.array(dtype=wp.vec4d)
 
 
 @wp.struct
@@ -110,6 +114,7 @@ class JointStep:
         worst: greatest opening of each group [m/s], shape (group_count,), float64.
         work, heat, kinetic, stored: energies at t(n) [J], shape (rate_count,), float64.
         load, effort, seen: impulse, drive and position at t(n), as in `JointPoses`.
+        pace: rate at t(n), the mean of both half steps around it [rad/s], [m/s], shape (rate_count,), float64.
     """
 
     screw: wp.array(dtype=Twist)
@@ -131,3 +136,4 @@ class JointStep:
     load: wp.array(dtype=wp.float64)
     effort: wp.array(dtype=wp.float64)
     seen: wp.array(dtype=wp.float64)
+    pace: wp.array(dtype=wp.float64)

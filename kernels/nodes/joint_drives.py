@@ -164,6 +164,7 @@ def count_rates(j: int, span: wp.float64, joints: RigidJoints, state_out: JointP
         step_out.heat[e] = state_out.heat[e] + half * lost * before
         step_out.effort[e] = state_out.drive[e] + half * y
         step_out.seen[e] = state_out.position[e]
+        step_out.pace[e] = mean
         state_out.work[e] = step_out.work[e] + half * y * after
         state_out.heat[e] = step_out.heat[e] + half * lost * after
         state_out.drive[e] = state_out.drive[e] + y

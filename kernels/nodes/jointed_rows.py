@@ -14,6 +14,8 @@ from warp_mca.kernels.nodes.rigid_pins import move_pin
 from warp_mca.kernels.nodes.rigid_rows import SOLVES, RigidRows, give_impulses, opening, row_lightness
 from warp_mca.kernels.nodes.symmetric import solve_factorised
 
+SURE = 1e-7  # share of a row that counts as held by it alone: axes of a loop may be 3e-4 rad off
+
 
 @wp.func
 def move_bodies(
@@ -58,6 +60,34 @@ def place_joints(
             if rows.joint[r] >= 0:
                 step_out.joints.total[r] = wp.float64(0.0)
     move_bodies(k, lane, span, bodies, rows, poses_out, step_out)
+
+
+@wp.func
+def note_rank(k: int, rows: RigidRows, poses_out: Poses, step: RigidStep):
+    """Keep how near joints of group k have come to a pose in which their rows hold fewer motions, see `JointState`."""
+    if rows.joints.begin[k] == rows.joints.begin[k + 1]:
+        return
+    j = rows.joints.member[rows.joints.begin[k]]
+    rank = wp.float64(0.0)
+    least = wp.float64(1.0)
+    for r in range(rows.begin[k], rows.begin[k + 1]):
+        share = step.share[r]
+        if rows.rate[r] < 0 and share > wp.float64(SURE):
+            rank += wp.float64(1.0)
+            least = wp.min(least, share)
+    own = poses_out.joints.rank[j]
+    clock = wp.float64(poses_out.joints.clock[j])
+    if own[0] == wp.float64(0.0):
+        own = wp.vec4d(rank, least, wp.float64(1.0), clock)
+    near = least / own[1]
+    if rank != own[0]:
+        near = wp.float64(0.0)
+        if rank > own[0]:  # it was so until now
+            own[0] = rank
+    if near < own[2]:
+        own[2] = near
+        own[3] = clock
+    poses_out.joints.rank[j] = own
 
 
 @wp.func

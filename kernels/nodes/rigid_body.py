@@ -14,7 +14,7 @@ from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.nodes.cluster import Clusters, spin_after
 from warp_mca.kernels.nodes.coupling import turned
 from warp_mca.kernels.nodes.gather import Kind, NodeData, NodeState, move, total_force_function
-from warp_mca.kernels.nodes.jointed_rows import jointed_lightness, place_joints, satisfy_joints
+from warp_mca.kernels.nodes.jointed_rows import jointed_lightness, note_rank, place_joints, satisfy_joints
 from warp_mca.kernels.nodes.rigid_motion import Poses, RigidBodies, RigidStep, find_motion, turned_by
 from warp_mca.kernels.nodes.rigid_pins import find_cluster, pull_cluster
 from warp_mca.kernels.nodes.rigid_rows import RigidRows, place_row, row_lightness, satisfy
@@ -66,6 +66,7 @@ def move_on(b: int, span: wp.float64, moves: bool, poses_out: Poses, step_out: R
     """Take the pose of a body from t(n) to t(n+1), if it moves, and say what Q - I is then."""
     if moves:
         f = step_out.turn[b]
+        poses_out.turn[b] = wp.max(poses_out.turn[b], wp.float64(2.0) * wp.atan(wp.length(f)))
         poses_out.centre[b] = poses_out.centre[b] + span * step_out.velocity[b]
         poses_out.rotation[b] = wp.normalize(poses_out.rotation[b] * wp.quatd(f[0], f[1], f[2], wp.float64(1.0)))
     step_out.turned[b] = turned_by(poses_out.rotation[b])
@@ -140,8 +141,10 @@ def advance_kernel(own: Kind, jointed: bool = False) -> Any:
                 speed = lightness(begin + e // size, begin + e % size, bodies, rows, moves, step_out)
                 step_out.matrix[rows.entry[k] + e] = speed
             wait_for_block()
-            factorise(rows.entry[k], size, lane, step_out.matrix)
+            factorise(rows.entry[k], size, lane, begin, step_out.matrix, step_out.share)
             if wp.static(jointed):
+                if moves and lane == 0:
+                    note_rank(k, rows, poses_out, step_out)
                 satisfy_joints(k, lane, span, moves, bodies, rows, clusters, poses_out, impulse_out, step_out)
             elif lane == 0:
                 satisfy(k, span, moves, bodies, rows, clusters, poses_out, impulse_out, step_out)

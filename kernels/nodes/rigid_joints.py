@@ -91,8 +91,9 @@ def left_of(x: Twist, begin: int, end: int, basis: wp.array(dtype=Twist)) -> Twi
 
 
 @wp.func
-def split_motions(j: int, joints: RigidJoints, step_out: JointStep):
-    """Orthonormal basis of B and W (Gram and Schmidt), and F."""
+def split_motions(j: int, joints: RigidJoints, step_out: JointStep) -> wp.float64:
+    """Orthonormal basis of B and W (Gram and Schmidt), and F; returns the least part of a screw that others leave."""
+    alone = wp.float64(1.0)
     first = 6 * j
     begin = joints.rate[j]
     count = joints.rate[j + 1] - begin
@@ -100,6 +101,7 @@ def split_motions(j: int, joints: RigidJoints, step_out: JointStep):
         x = step_out.screw[begin + k]
         left = left_of(x, first, first + k, step_out.basis)
         size = wp.length(left)
+        alone = wp.min(alone, size / wp.length(x))
         if size > wp.float64(DEPENDENT) * wp.length(x):
             step_out.basis[first + k] = left / size
         else:
@@ -132,6 +134,7 @@ def split_motions(j: int, joints: RigidJoints, step_out: JointStep):
                 y[k] = value / size
                 found += y[k] * step_out.basis[first + k]
         step_out.dual[begin + e] = found
+    return alone
 
 
 @wp.func
@@ -222,7 +225,9 @@ def place_joint(
 ):
     """Rows of a joint at t(n): wrenches that hold it, then those that do work on one rate each."""
     place_screws(j, joints, poses_out.joints, step_out.joints)
-    split_motions(j, joints, step_out.joints)
+    alone = split_motions(j, joints, step_out.joints)
+    if moves and alone < poses_out.joints.alone[j][0]:
+        poses_out.joints.alone[j] = wp.vec2d(alone, wp.float64(poses_out.joints.clock[j]))
     a = rigid_pose(joints.body[j], joints.arm[j], poses_out)
     b = rigid_pose(joints.other[j], joints.other_arm[j], poses_out)
     p = joints.pin[j]

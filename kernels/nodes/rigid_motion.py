@@ -63,6 +63,7 @@ class Poses:
         momentum: P at the latest half step [kg m/s], shape (body_count,), vec3d.
         spin: L at the latest half step [kg m^2/s], shape (body_count,), vec3d.
         orientation: rotation of the cluster of each pin [-], shape (pin_count,), quatd.
+        turn: greatest turn of each body in a step [rad], shape (body_count,), float64.
         joints: state of the joints between whole bodies.
     """
 
@@ -71,6 +72,7 @@ class Poses:
     momentum: wp.array(dtype=wp.vec3d)
     spin: wp.array(dtype=wp.vec3d)
     orientation: wp.array(dtype=wp.quatd)
+    turn: wp.array(dtype=wp.float64)
     joints: JointPoses
 
 
@@ -90,6 +92,7 @@ class RigidStep:
         gap: speed that closes the opening of each row in the step [m/s], shape (row_count,), float64.
         value: speeds at which rows open, then their impulses [m/s], [N s], shape (row_count,), float64.
         matrix: opening speeds due to unit impulses, group by group, then factorised [1/kg], float64.
+        share: of each row that does not follow from those before it in its group [-], shape (row_count,), float64.
         mean: motion of each pin's cluster after the free step, shape (pin_count,), Mean.
         point: P of each pin at t(n), from the place at the start [m], shape (pin_count,), vec3d.
         impulse: J and T of each pin on its cluster [N s], [N m s], shape (pin_count, 2), vec3d.
@@ -108,6 +111,7 @@ class RigidStep:
     gap: wp.array(dtype=wp.float64)
     value: wp.array(dtype=wp.float64)
     matrix: wp.array(dtype=wp.float64)
+    share: wp.array(dtype=wp.float64)
     mean: wp.array(dtype=Mean)
     point: wp.array(dtype=wp.vec3d)
     impulse: wp.array2d(dtype=wp.vec3d)

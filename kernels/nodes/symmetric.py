@@ -8,19 +8,30 @@ DEPENDENT = 1e-10  # a row is dependent if its pivot is below this share of its 
 
 
 @wp.func
-def factorise(first: int, size: int, lane: int, matrix_out: wp.array(dtype=wp.float64)):
+def factorise(
+    first: int,
+    size: int,
+    lane: int,
+    begin: int,
+    matrix_out: wp.array(dtype=wp.float64),
+    share_out: wp.array(dtype=wp.float64),
+):
     """Factorise a symmetric matrix as L D L^T in place, by all threads of a block. D is on the diagonal; it is 0 for
-    dependent rows."""
+    dependent rows. share_out[begin:] is D over the diagonal entry: what of a row does not follow from those before."""
     for j in range(size):
         pivot = matrix_out[first + j * size + j]
-        least = wp.float64(DEPENDENT) * pivot
+        whole = pivot
         for k in range(j):
             x = matrix_out[first + j * size + k]
             pivot -= x * x * matrix_out[first + k * size + k]
-        if pivot <= least:
+        share = wp.float64(0.0)
+        if pivot <= wp.float64(DEPENDENT) * whole:
             pivot = wp.float64(0.0)
+        else:
+            share = pivot / whole
         wait_for_block()
         if lane == 0:
+            share_out[begin + j] = share
             matrix_out[first + j * size + j] = pivot
         for i in range(j + 1 + lane, size, wp.block_dim()):
             x = matrix_out[first + i * size + j]

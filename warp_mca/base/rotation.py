@@ -1,4 +1,4 @@
-"""Owns rotations of bodies: from a rotation vector to a matrix."""
+"""Owns rotations of bodies: from a rotation vector to a matrix and back, and those of clusters."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ def rotation_matrix(rotation_vector: Sequence[float] | Array) -> Array:
     return Rotation.from_rotvec(rotation_vector).as_matrix()
 
 
-def rotation_vector(quaternion: Sequence[float] | Array) -> Array:
-    """Rotation vector [rad], shape (3,), float64, of a unit quaternion (x, y, z, w)."""
+def rotation_vector(matrix: Array) -> Array:
+    """Rotation vector [rad], shape (3,), float64, of a rotation matrix, shape (3, 3)."""
     from scipy.spatial.transform import Rotation
 
-    return Rotation.from_quat(quaternion).as_rotvec()
+    return Rotation.from_matrix(matrix).as_rotvec()
 
 
 def best_rotation(a: Array, b: Array, weights: Array) -> Array:

@@ -26,6 +26,7 @@ from warp_mca.physics.floating.frames import with_floating_frames
 from warp_mca.step.output import Output
 from warp_mca.step.sensor_stage import SensorStage
 from warp_mca.step.solver import Solver
+from warp_mca.step.state_figures import at_last_record
 from warp_mca.step.steps import Steps
 from warp_mca.system.records import SceneRecords
 from warp_mca.system.state import State
@@ -184,13 +185,8 @@ class Impact:
             Loop(self, told, ended).run(until)
 
     def at_last_record(self) -> tuple[Array, Array]:
-        """Displacements [m] and velocities [m/s] of the nodes at the last record, each shape (node_count, 3), float64.
-
-        A record is followed by a step, which is taken back.
-        """
-        u, after, dt = self.solver.nodes.at_record(self.state)
-        v = after.numpy()
-        return u.numpy() - dt * v, 0.5 * (self.solver.work.v_before.numpy() + v)
+        """Displacements and velocities of the nodes, as `step.state_figures.at_last_record` has them."""
+        return at_last_record(self.solver, self.state)
 
     def read(self, written: int, records: Mapping[str, NDArray]) -> None:
         """Hand records to each scene that no guard has stopped.

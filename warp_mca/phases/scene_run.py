@@ -19,6 +19,7 @@ from warp_mca.results.result import Result, summarise
 from warp_mca.results.sensor_history import sensor_figures
 from warp_mca.scene.contacts import contact_names
 from warp_mca.step.state_figures import (
+    at_last_record,
     flexible_bodies,
     joint_impulses,
     max_normal_force,
@@ -26,6 +27,7 @@ from warp_mca.step.state_figures import (
     max_plastic_strain,
     max_speed,
     rigid_bodies,
+    rigid_extremes,
 )
 from warp_mca.watch.energy import spring_shares
 from warp_mca.watch.failure_report import failure_report
@@ -131,6 +133,7 @@ class SceneRun:
         ready, own = self.ready, self.rows(before[-1].facts["end"] if before else 0.0, origin)
         shares = spring_shares(self._context, self.ledger, contact_names(ready.scene.contacts))
         summary = summarise(own.history, self._facts(wall, shares), own.contacts)
+        summary |= self._rigid_facts(own.history, stopped is not None)
         told = self._told(stopped is not None, history=own.history, contacts=own.contacts, shares=shares, origin=origin)
         found = joined(ready.scene, ready.probes, [*before, own])
         summary |= sensor_figures(found["probes"], found["sections"], found["history"])
@@ -147,15 +150,21 @@ class SceneRun:
         """Steps that its rows cover [-], fewer than asked where it ended early."""
         return self.steps.per_interval * max(self.ledger.kept.count - 1, 0)
 
-    def _rigid_facts(self) -> dict[str, Any]:
-        """What a summary says of rigid bodies and of joints between whole bodies."""
-        of_scene, found = (self.solver, self.state, self.index), {}
-        if self.ready.scene.rigid_names:
-            found["rigid_bodies"] = rigid_bodies(*of_scene)
-        if self.ready.model.body_joints:
-            found["joints"] = joint_reports(*of_scene, history_columns(self.ledger))
-            names = [body.name for body in self.ready.scene.bodies if not body.rigid]
-            found["flexible_bodies"] = flexible_bodies(self.ready.model, self.looks.nodes, self.state, names)
+    def _rigid_facts(self, history: Mapping[str, Array], stopped: bool) -> dict[str, Any]:
+        """What a summary says of rigid bodies and of joints between whole bodies, at the last row of the history.
+
+        A run that was `stopped` ended somewhere behind it.
+        """
+        model, scene, found = self.ready.model, self.ready.scene, {}
+        if not scene.rigid_names:
+            return found
+        fields = (self.state.u.numpy(), self.state.v.numpy()) if stopped else at_last_record(self.solver, self.state)
+        u, v = (np.asarray(field[self.looks.nodes], dtype=np.float64) for field in fields)
+        found["rigid_bodies"] = rigid_bodies(model, u, v)
+        if model.body_joints:
+            found["joints"] = joint_reports(self.solver, self.index, history)
+            names = [body.name for body in scene.bodies if not body.rigid]
+            found["flexible_bodies"] = flexible_bodies(model, u, v, names)
         return found
 
     def _facts(self, wall: Mapping[str, float], shares: Mapping[str, SpringShare | None]) -> dict[str, Any]:
@@ -172,7 +181,6 @@ class SceneRun:
             **self._solver_facts(),
             "refine": scene.refine,
         }
-        more |= self._rigid_facts()
         if model.rates:
             more |= rate_figures(model.rates, self.steps.dt, count, wall)
         if self.solver.layout.count > 1:
@@ -278,6 +286,7 @@ class SceneRun:
             bent=self.ledger.kept.stiffened if stopped else self.looks.bent(u),
             watch=self.looks.watch,
             stopped=stopped,
+            rigid=rigid_extremes(self.solver, self.state, self.index),
             **found,
         )
         return told_at_the_end(finished, ready.warnings)

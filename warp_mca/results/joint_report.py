@@ -11,22 +11,22 @@ from warp_mca.base.arrays import Array
 from warp_mca.kernels.nodes.joint_arrays import SLIDE
 
 if TYPE_CHECKING:
-    from warp_mca.system.actor import System
-    from warp_mca.system.state import State
+    from warp_mca.step.solver import Solver
 
 
-def joint_reports(solver: System, state: State, scene: int, history: Mapping[str, Array]) -> dict[str, Any]:
+def joint_reports(solver: Solver, scene: int, history: Mapping[str, Array]) -> dict[str, Any]:
     """By joint: greatest force, moment and drive torques, each with unit and time [s], and the freedoms at the end.
 
     Args:
-        solver: of the run.
-        state: at its end; rates are those of the latest half step.
+        solver: of the run, whose last step is that of the last record.
         scene: its number in a batch.
         history: columns of this scene.
     """
     found: dict[str, Any] = {}
     time, first = history["time_s"], 0
-    position, rate = state.rigid.joints.position.numpy(), state.rigid.joints.rate.numpy()
+    assert solver.rigid.joints is not None
+    step = solver.rigid.joints.step
+    seen, pace = step.seen.numpy(), step.pace.numpy()
     for item in solver.model.body_joints:
         own = slice(first, first + len(item.kind))
         first = own.stop
@@ -40,8 +40,8 @@ def joint_reports(solver: System, state: State, scene: int, history: Mapping[str
             "max_force": _greatest(time, force, "N"),
             "max_moment": _greatest(time, moment, "N m"),
             "max_drive": [_greatest(time, value, unit[0]) for value, unit in zip(drives, units, strict=True)],
-            "position": [_value(q, unit[1]) for q, unit in zip(position[own], units, strict=True)],
-            "rate": [_value(q, unit[2]) for q, unit in zip(rate[own], units, strict=True)],
+            "position": [_value(q, unit[1]) for q, unit in zip(seen[own], units, strict=True)],
+            "rate": [_value(q, unit[2]) for q, unit in zip(pace[own], units, strict=True)],
         }
     return found
 

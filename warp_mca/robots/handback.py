@@ -10,7 +10,7 @@ import numpy as np
 
 from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
-from warp_mca.base.rotation import rotation_matrix
+from warp_mca.base.rotation import rotation_matrix, rotation_vector
 from warp_mca.robots.handoff import REST, joint_name
 from warp_mca.robots.machine import Machine
 from warp_mca.scene import Body, Scene
@@ -41,7 +41,6 @@ class HandBack:
 def hand_back(robot: Robot, swing: RobotSwing, scene: Scene, result: Result) -> HandBack:
     """The machine after the impact `result` of `scene`, which `robot` handed over after `swing`.
 
-    A state ends one step after the last record, with momenta of half a step before; the machine is taken back to there.
     Rates are M^-1 p with the generalised momenta p = sum (J_v^T P + J_w^T L) + rotors of the bodies' momenta P and
     spins L; with loops, those of their free motion.
 
@@ -75,7 +74,7 @@ def hand_back(robot: Robot, swing: RobotSwing, scene: Scene, result: Result) -> 
         qvel=tuple(rates),
         ctrl=tuple(swing.ctrl),
         against=beside,
-        clock=robot.clock + swing.t_end + float(summary["simulated_time"]) + ends.half,
+        clock=robot.clock + swing.t_end + float(summary["simulated_time"]),
     )
     lost = kinetic + float(summary["energy"]["elastic"]) - own
     return HandBack(robot=following, momentum=momentum, kinetic_energy=own, vibration=lost)
@@ -98,27 +97,24 @@ def _check(robot: Robot, scene: Scene, summary: Mapping[str, Any]) -> None:
 
 
 class _Ends:
-    """Bodies of a scene at the end of its impact, where momenta are known: half a step before the last positions.
+    """Bodies of a scene at the end of its impact.
 
     Attributes:
-        half: half a step [s].
         moved: mass centre [m], momentum [kg m/s], spin [kg m^2/s], each shape (3,), and kinetic energy [J], by name.
     """
 
     def __init__(self, scene: Scene, summary: Mapping[str, Any]) -> None:
-        self._scene, self._summary, self.half = scene, summary, 0.5 * float(summary["dt"])
+        self._scene, self._summary = scene, summary
         self.moved: dict[str, tuple[Array, Array, Array, float]] = {}
         self._turned: dict[str, Array] = {}
         for name, found in summary["rigid_bodies"].items():
             P, L = np.array(found["momentum"]), np.array(found["spin"])
-            turned = rotation_matrix(found["rotation"])
-            spin = np.asarray(np.linalg.solve(turned @ np.array(found["inertia"]) @ turned.T, L), dtype=np.float64)
-            self._turned[name] = rotation_matrix(-self.half * spin) @ turned
+            self._turned[name] = rotation_matrix(found["rotation"])
             own = 0.5 * float(P @ P) / found["mass"] + 0.5 * float(L @ self.spin(name, L))
-            self.moved[name] = np.array(found["centre"]) - self.half * P / found["mass"], P, L, own
+            self.moved[name] = np.array(found["centre"]), P, L, own
         for name, found in summary.get("flexible_bodies", {}).items():
             centre, P, L = (np.array(found[key]) for key in ("centre", "momentum", "spin"))
-            self.moved[name] = centre - self.half * P / found["mass"], P, L, float(found["kinetic"])
+            self.moved[name] = centre, P, L, float(found["kinetic"])
 
     def rotation(self, name: str) -> Array:
         """From the frame of a rigid body to the world at the end, shape (3, 3)."""
@@ -140,7 +136,7 @@ class _Ends:
         """Positions and rates of the freedoms of a joint, each shape (count,)."""
         found = self._summary["joints"][name]
         position, rate = (np.array([item["value"] for item in found[key]]) for key in ("position", "rate"))
-        return position - self.half * rate, rate
+        return position, rate
 
     def beside(self, body: Body) -> Body:
         """A body beside the machine where it is at the end, with its motion; flexible ones are held."""
@@ -150,15 +146,9 @@ class _Ends:
         spin = self.spin(body.name, L)
         origin = self.origin(body.name)
         velocity = P / self._summary["rigid_bodies"][body.name]["mass"] + np.cross(spin, origin - centre)
-        turn = _rotation_vector(self.rotation(body.name))
+        turn = rotation_vector(self.rotation(body.name))
         vectors = {"position": origin, "rotation": turn, "velocity": velocity, "angular_velocity": spin}
         return replace(body, **{key: tuple(float(v) for v in value) for key, value in vectors.items()})
-
-
-def _rotation_vector(matrix: Array) -> Array:
-    from scipy.spatial.transform import Rotation
-
-    return Rotation.from_matrix(matrix).as_rotvec()
 
 
 def _take_joints(machine: Machine, link: int, q: Array, rotor: Array, swing: RobotSwing, ends: _Ends) -> None:

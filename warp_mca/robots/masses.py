@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,6 +35,12 @@ class MassProperties:
     def about_origin(self) -> Array:
         """Inertia about the origin of the frame [kg m^2], shape (3, 3), float64."""
         return self.inertia + self.mass * spread(self.centre)
+
+    @property
+    def is_possible(self) -> bool:
+        """Whether a body can have this inertia."""
+        a, b, c = np.linalg.eigvalsh(self.inertia)
+        return bool(a > 0.0 and a + b >= c * (1.0 - 1e-6))
 
     def less(self, other: MassProperties) -> MassProperties:
         """What remains when another one is taken away."""
@@ -77,24 +83,35 @@ def rest_of(name: str, file: MassProperties, mesh: MassProperties) -> MassProper
     """What a link has over its mesh, and rides on it as a rigid body; None where they are alike.
 
     Raises:
-        RequestError: it is no mass of a body.
+        RequestError: it is no mass of a body, or the mesh lies elsewhere.
     """
     if file.is_like(mesh):
         return None
+    if not _has_rest(file, mesh) and _has_rest(file, replace(mesh, centre=file.centre)):
+        place, there = (", ".join(f"{x:.4g}" for x in item.centre) for item in (mesh, file))
+        remedy = f"the file has that of the link at ({there}), in the link's frame, which meshes are given in; move it"
+        raise bad_value(f"mass centre of the mesh of link {name} [m]", f"({place})", remedy)
     field = f"mass of the mesh of link {name} [kg]"
     if mesh.mass >= (1.0 - SAME) * file.mass:
         remedy = f"the file gives the link {file.mass:.6g} kg, and the mesh must not have more; change one of them"
         raise bad_value(field, round(mesh.mass, 9), remedy)
     rest = file.less(mesh)
     a, b, c = np.linalg.eigvalsh(rest.inertia)
-    if a <= 0.0 or a + b < c * (1.0 - 1e-6):
+    if not rest.is_possible:
         x, y, z = rest.centre
         remedy = (
             f"what the file has beyond it, {rest.mass:.4g} kg at ({x:.4g}, {y:.4g}, {z:.4g}) m, would have the "
-            f"principal moments of inertia {a:.4g}, {b:.4g} and {c:.4g} kg m^2, which no body has; change mesh or file"
+            f"principal moments of inertia {a:.4g}, {b:.4g} and {c:.4g} kg m^2, which no body has, "
+            f"with the mesh's mass centre {np.linalg.norm(mesh.centre - file.centre):.3g} m from that of the file; "
+            "change mesh or file"
         )
         raise bad_value(field, round(mesh.mass, 9), remedy)
     return rest
+
+
+def _has_rest(file: MassProperties, mesh: MassProperties) -> bool:
+    """Whether `rest_of` has an answer."""
+    return file.is_like(mesh) or (mesh.mass < (1.0 - SAME) * file.mass and file.less(mesh).is_possible)
 
 
 def regular(machine: Machine) -> Array:

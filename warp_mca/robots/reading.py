@@ -80,10 +80,11 @@ def _compiled(robot: Robot, spec: Any) -> Any:
 
 def _parsed(mj: Any, robot: Robot) -> Any:
     path = Path(robot.path)
-    if path.suffix.lower() not in SUFFIXES:
+    if path.suffix.lower() not in SUFFIXES and not path.is_dir():
         raise bad_value("Robot.file", robot.path, "give an MJCF file (.xml) or a URDF file (.urdf)")
     if not path.is_file():
-        raise bad_value("Robot.file", robot.path, "there is no such file")
+        remedy = "this is a folder; name a file in it" if path.is_dir() else "there is no such file"
+        raise bad_value("Robot.file", robot.path, remedy)
     try:
         return mj.MjSpec.from_file(str(path))
     except (ValueError, RuntimeError) as error:

@@ -89,6 +89,9 @@ class Robot:
         object.__setattr__(self, "flexible", {name: self._body(name, item) for name, item in self.flexible.items()})
         validate.kinds("Robot", (str, NoneType), "give the name of a keyframe", keyframe=self.keyframe)
         validate.members("Robot", (RigidPlane, Body), against=self.against)
+        for item in self.against:
+            if isinstance(item, Body) and item.is_inertia:
+                raise bad_value("Robot.against", item.name, "it is a mass without surface; give it a geometry")
         validate.kinds("Robot", (tuple, list), "give a tuple of names", touch=self.touch)
         validate.texts("Robot", **{f"touch[{k}]": name for k, name in enumerate(self.touch)})
         validate.unique("Robot.against", [body.name for body in self.against if isinstance(body, Body)], "body")

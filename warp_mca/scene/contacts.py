@@ -16,6 +16,7 @@ from warp_mca.scene.contact_laws import CONTACT_LAWS, ContactLaw, DampedPenalty,
 from warp_mca.scene.friction_laws import FRICTION_LAWS, FrictionLaw
 
 MOST_FRICTION = 1e6  # with which nothing slides [-]
+MOST_STIFFNESS = 1e12  # of a spring of contact [N/m]: that of diamond, a metre wide
 OVERLAP_CHOICES = ("refuse", "stress_free", "press")
 
 
@@ -165,6 +166,7 @@ class Contact(_Springs):
 
     def _check_stiffness(self, stiffness: float) -> None:
         validate.positive("Contact", stiffness=stiffness)
+        validate.within("Contact", 0.0, MOST_STIFFNESS, stiffness=stiffness)
         for name in ("penalty", "bond"):
             if getattr(self, name) is not None:
                 raise bad_value("Contact.stiffness", stiffness, f"leave it or {name} out")

@@ -154,6 +154,9 @@ class Freedom:
         validate.positive(owner, friction_rate=self.friction_rate)
         if self.limits is not None:
             check_limits(owner, self.limits)
+            if self.limit_stiffness == 0.0:
+                remedy = "springs of limits need a stiffness above 0; give one, or leave limits out"
+                raise bad_value(f"{owner}.limit_stiffness", self.limit_stiffness, remedy)
         remedy = "give an Amplitude of torques, a PositionServo, a Controller, or None"
         validate.kinds(owner, (Amplitude, PositionServo, Controller, NoneType), remedy, motor=self.motor)
         if self.kind == "ball":

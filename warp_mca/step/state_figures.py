@@ -1,4 +1,4 @@
-"""Owns the figures of one scene that are read off a state when its run ends."""
+"""Owns the figures of one scene that are read off a state when its run ends, and the motion at its last record."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warp_mca.base.rotation import rotation_vector
+from warp_mca.base.arrays import Array
+from warp_mca.base.rotation import mean_pose, rotation_vector
+from warp_mca.system.rigid import RigidExtremes
 
 if TYPE_CHECKING:
     from warp_mca.step.solver import Solver
@@ -40,40 +42,60 @@ def max_speed(solver: Solver, state: State, scene: int = 0) -> float:
     return math.sqrt(squares[first:end].max() if len(squares) > 1 else squares[0])
 
 
-def rigid_bodies(solver: Solver, state: State, scene: int = 0) -> dict[str, dict[str, object]]:
-    """What moves each rigid body of a scene, by name; see `RigidState`.
+def at_last_record(solver: Solver, state: State) -> tuple[Array, Array]:
+    """Displacements [m] and velocities [m/s] of the nodes at the last record, each shape (node_count, 3), float64.
 
-    Mass [kg], inertia about the centre at the start [kg m^2]; mass centre at the end and its displacement [m], rotation
-    since the start as a vector [rad]; momentum [kg m/s] and spin [kg m^2/s] at the latest half step.
+    A record is followed by a step, which is taken back; the velocity is the mean of both half steps around the record.
     """
-    own = state.rigid
-    names = ("centre", "rotation", "momentum", "spin")
-    way, turned, momentum, spin = (np.asarray(getattr(own, name).numpy(), dtype=np.float64) for name in names)
-    return {
-        body.name: {
-            "mass": body.mass,
-            "inertia": body.inertia.tolist(),
-            "centre": (body.centre + way[k]).tolist(),
-            "displacement": way[k].tolist(),
-            "rotation": rotation_vector(turned[k]).tolist(),
-            "momentum": momentum[k].tolist(),
-            "spin": spin[k].tolist(),
-        }
-        for k, body in enumerate(solver.model.rigid_bodies)
-        if body.scene == scene
-    }
+    u, after, dt = solver.nodes.at_record(state)
+    v = after.numpy()
+    return u.numpy() - dt * v, 0.5 * (solver.work.v_before.numpy() + v)
 
 
-def flexible_bodies(model: Model, nodes: slice, state: State, names: Sequence[str]) -> dict[str, dict[str, object]]:
-    """What moves flexible bodies of a scene, by name: as `rigid_bodies`, and kinetic energy [J].
+def rigid_bodies(model: Model, u: Array, v: Array) -> dict[str, dict[str, object]]:
+    """What moves each rigid body of a scene, riders included, by name.
+
+    Mass [kg], inertia about the centre at the start [kg m^2]; mass centre and its displacement [m], rotation since the
+    start as a vector [rad], momentum [kg m/s] and spin about the centre [kg m^2/s].
 
     Args:
         model: of that scene alone.
-        nodes: its nodes in the state.
-        state: at the end.
+        u, v: displacements [m] and velocities [m/s] of its nodes, each shape (node_count, 3), float64.
+    """
+    found: dict[str, dict[str, object]] = {}
+    for body in model.rigid_bodies:
+        m, X, x, w = model.mass[body.nodes], model.X[body.nodes], (model.X + u)[body.nodes], v[body.nodes]
+        way = m @ u[body.nodes] / m.sum()
+        centre = body.centre + way
+        found[body.name] = {
+            "mass": body.mass,
+            "inertia": body.inertia.tolist(),
+            "centre": centre.tolist(),
+            "displacement": way.tolist(),
+            "rotation": rotation_vector(mean_pose(X, x, m)[2]).tolist(),
+            "momentum": (m @ w).tolist(),
+            "spin": (m @ np.cross(x - centre, w)).tolist(),
+        }
+    return found
+
+
+def rigid_extremes(solver: Solver, state: State, scene: int) -> RigidExtremes | None:
+    """What single steps say of the rigid bodies of a scene, for warnings; None without such bodies."""
+    bodies = [body.scene == scene for body in solver.model.rigid_bodies]
+    if not any(bodies):
+        return None
+    joints, own = np.array([item.scene == scene for item in solver.model.body_joints], dtype=bool), state.rigid.joints
+    alone, rank = (own.alone.numpy()[joints], own.rank.numpy()[joints]) if own else (np.zeros((0, 2)), np.zeros((0, 4)))
+    return RigidExtremes(dt=solver.nodes.dt, turn=state.rigid.turn.numpy()[bodies], alone=alone, rank=rank)
+
+
+def flexible_bodies(model: Model, u: Array, v: Array, names: Sequence[str]) -> dict[str, dict[str, object]]:
+    """What moves flexible bodies of a scene, by name: as `rigid_bodies`, and kinetic energy [J].
+
+    Args:
+        model, u, v: as there.
         names: of the bodies.
     """
-    u, v = (np.asarray(field.numpy()[nodes], dtype=np.float64) for field in (state.u, state.v))
     starts = sorted([*model.node_start.values(), model.node_count])
     found: dict[str, dict[str, object]] = {}
     for name in names:
@@ -92,11 +114,14 @@ def flexible_bodies(model: Model, nodes: slice, state: State, names: Sequence[st
 
 
 def joint_impulses(solver: Solver, state: State, scene: int = 0) -> dict[str, list[float]]:
-    """Impulse that each joint of a scene gave to its first body [N s], by name."""
+    """Impulse that each joint of a scene gave to its first body [N s], by name.
+
+    That of joints between whole bodies is the one up to the last record, others are half a step ahead.
+    """
     impulse = state.constraints.impulse.numpy()
     joints = solver.model.joints[solver.layout.joints[scene] : solver.layout.joints[scene + 1]]
     found = {joint.name: impulse[joint.start : joint.end].sum(axis=0).tolist() for joint in joints}
-    if whole := solver.model.body_joints:
-        given = state.rigid.joints.impulse.numpy().reshape(len(whole), -1)[:, :3]
+    if (whole := solver.model.body_joints) and solver.rigid.joints:
+        given = solver.rigid.joints.step.load.numpy().reshape(len(whole), -1)[:, :3]
         found |= {item.name: own.tolist() for item, own in zip(whole, given, strict=True) if item.scene == scene}
     return found

@@ -1,4 +1,4 @@
-"""Owns the arrays of rigid bodies, and of what binds them."""
+"""Owns the arrays of rigid bodies, and of what binds them, and extremes of a run that warnings read."""
 
 from __future__ import annotations
 
@@ -100,3 +100,19 @@ class RigidPin:
     place: Array = field(metadata=AS_IS)
     axis: Array = field(metadata=AS_IS)
     arm: Array = field(metadata=AS_IS)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RigidExtremes:
+    """What single steps of a run say of rigid bodies of a scene and of joints between whole bodies.
+
+    Attributes:
+        dt: step of bodies and joints [s].
+        turn: greatest turn of each body in a step [rad], shape (body_count,), float64.
+        alone, rank: as in `JointState`, shapes (joint_count, 2) and (joint_count, 4), float64; empty without joints.
+    """
+
+    dt: float
+    turn: Array
+    alone: Array
+    rank: Array

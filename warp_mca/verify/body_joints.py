@@ -26,11 +26,10 @@ def link(name: str, at: Sequence[float] | Array = (0.0, 0.0, 0.0), **more: Any) 
 
 
 def machine(
-    bodies: Sequence[mca.Body], joints: Sequence[Any], steps: int, duration: float = 1.0, rows: int = 100, **more: Any
+    bodies: Sequence[mca.Body], joints: Sequence[Any], steps: int, duration: float = 1.0, **more: Any
 ) -> mca.Scene:
-    """A scene that takes so many steps, or more where springs ask for it."""
-    scale = min(1.0, rows / steps)
-    impact = mca.ImpactPhase(duration=duration, output_interval=duration / rows, time_step_scale=scale)
+    """A scene with so many rows, each of which is a step, or more where it must be shorter."""
+    impact = mca.ImpactPhase(duration=duration, output_interval=duration / steps)
     return mca.Scene(name="machine", bodies=tuple(bodies), joints=tuple(joints), impact=impact, **more)
 
 
@@ -92,7 +91,7 @@ def jointed_pendulums(setup: Setup) -> list[Row]:
         for steps in samples:
             result = setup.run(pendulum_chain(count, steps))
             angles = np.stack([result[f"joint_J{k}_q1_rad"] for k in range(count)], axis=1)
-            off.append(float(np.abs(angles - known).max()))
+            off.append(float(np.abs(angles[:: steps // 100] - known).max()))
         sizes = tuple(1.0 / steps for steps in samples)
         rows.append(
             Row(f"{name} pendulum, greatest difference of an angle", 0.0, off, "rad", 1e-5, SECOND, sizes, 1.0, 1.8)
@@ -150,7 +149,7 @@ def jointed_tree(setup: Setup) -> list[Row]:
     for steps in samples:
         result = setup.run(tree(steps))
         found = np.stack([result[f"joint_{name}"] for name in names], axis=1)
-        off.append(float(np.abs(found - known[:, 4:]).max()))
+        off.append(float(np.abs(found[:: steps // 100] - known[:, 4:]).max()))
     turned = setup.run(tree(samples[-1], (0.5, 1.0, -2.0)))
     apart = float(np.abs(np.stack([turned[f"joint_{name}"] for name in names], axis=1) - found).max())
     assert result is not None

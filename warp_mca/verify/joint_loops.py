@@ -85,7 +85,7 @@ def four_bar_loop(setup: Setup) -> list[Row]:
         mca.Revolute(name="D", body="rocker", at=(0.0, 0.0, 0.0), **own),
         mca.Revolute(name="Q", body="coupler", at=(COUPLER, 0, 0), other="rocker", other_at=(ROCKER, 0, 0), **own),
     )
-    samples, off, shape = setup.choose((1000, 2000), (1000, 2000, 4000)), [], 0.0
+    samples, off, shape = setup.choose((4000, 8000), (4000, 8000, 16000)), [], 0.0
     for steps in samples:
         result = setup.run(machine(bodies, joints, steps, gravity=(0.0, -G, 0.0)))
         found = theta + result["joint_O_q1_rad"]
@@ -152,11 +152,11 @@ def shafts(setup: Setup) -> tuple[float, float]:
     return float(np.abs(result["joint_O_q1_rad"] - known).max()), bend
 
 
-def rotor(setup: Setup, steps: int, speed: float, rows: int = 100, **freedom: Any) -> mca.Result:
+def rotor(setup: Setup, steps: int, speed: float, **freedom: Any) -> mca.Result:
     """A rotor of 0.25 kg m^2 on a hinge about z."""
     body = link("r", angular_velocity=(0.0, 0.0, speed), **ROTOR)
     joint = mca.Articulation(name="J", body="r", freedoms=(mca.Freedom(**freedom),))
-    return setup.run(machine((body,), (joint,), steps, 1.0, rows))
+    return setup.run(machine((body,), (joint,), steps))
 
 
 @case(
@@ -168,7 +168,7 @@ def rotor(setup: Setup, steps: int, speed: float, rows: int = 100, **freedom: An
 def joint_drives(setup: Setup) -> list[Row]:
     """A rotor of 0.25 kg m^2 over a second, with each of them in turn; J + A where a rotor turns with it."""
     steps = 10000
-    stiff = rotor(setup, steps, 5.0, 2000, limits=(-0.1, 0.1), limit_stiffness=1e4)
+    stiff = rotor(setup, steps, 5.0, limits=(-0.1, 0.1), limit_stiffness=1e4)
     slow = rotor(setup, steps, 5.0, damping=0.5)
     rubbed = rotor(setup, steps, 5.0, friction=2.0)
     driven = rotor(setup, steps, 0.0, armature=0.1, motor=mca.Amplitude(times=(0.0, 1.0), values=(0.0, 3.0)))
@@ -183,7 +183,7 @@ def joint_drives(setup: Setup) -> list[Row]:
     swing = 0.2 * (1.0 - np.cos(math.sqrt(25.0 / 0.35) * sprung.time))
     hung = {"mass": 1.0, "inertia": (0.1, 0.2, 0.25), "centre": (0.0, -1.0, 0.0), "rotation": (0.0, 0.0, 1e-3)}
     hinge = mca.Articulation(name="J", body="r", freedoms=(mca.Freedom(armature=0.1),))
-    pendulum = setup.run(machine((link("r", **hung),), (hinge,), 20000, 8.0, 1000, gravity=(0.0, -G, 0.0)))
+    pendulum = setup.run(machine((link("r", **hung),), (hinge,), 8000, 8.0, gravity=(0.0, -G, 0.0)))
     passed = crossings(pendulum.time, pendulum[q] + 1e-3, 0.0)
     period = 2.0 * math.pi * math.sqrt((1.0 + J + 0.1) / G)
     bounce = 0.1 + 5.0 * math.sqrt(J / 1e4)

@@ -81,7 +81,7 @@ def rigid_pendulum_period(setup: Setup) -> list[Row]:
     """1 m x 0.1 m x 0.1 m, let go at rest at 2 rad; two whole periods between passages of the lowest point."""
     from scipy.special import ellipk
 
-    samples = setup.choose((1000, 2000), (1000, 2000, 4000))
+    samples = setup.choose((8000, 16000), (8000, 16000, 32000))
     results = [setup.run(setup.scene("pendulum", samples=count)) for count in samples]
     period, drift = [], []
     for result in results:
@@ -113,7 +113,7 @@ def rigid_double_pendulum(setup: Setup) -> list[Row]:
     from warp_mca.physics.elements.cells import nodal_masses
 
     start = {"theta_OA": THETA[0], "theta_AB": THETA[1], "rate_OA": THETA_DOT[0], "rate_AB": THETA_DOT[1]}
-    samples = setup.choose((200, 400), (200, 400, 800))
+    samples = setup.choose((2000, 4000), (2000, 4000, 8000))
     scenes = [
         setup.scene("double_pendulum", rigid=True, length=LENGTH, duration=SPAN, samples=count, **start)
         for count in samples

@@ -75,9 +75,9 @@ def doubled_node(c: Context, _: float) -> Iterator[Values]:
     "piece at most",
 )
 def loose_pieces(c: Context, most: float) -> Iterator[Values]:
-    """Pieces of such meshes, without doubled nodes."""
+    """Pieces of such meshes of flexible bodies, without doubled nodes."""
     for name, mesh in _foreign(c):
-        if (count := pieces(mesh)) > most and not doubled_nodes(mesh):
+        if name not in c.scene.rigid_names and (count := pieces(mesh)) > most and not doubled_nodes(mesh):
             yield dict(body=name, count=count)
 
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from warp_mca.scene import Scene
     from warp_mca.system.contact import ContactPass
     from warp_mca.system.model import Model
+    from warp_mca.system.rigid import RigidExtremes
     from warp_mca.watch.ledger import Ledger
     from warp_mca.watch.passing import Watch
 
@@ -135,6 +136,7 @@ class Finished(Context):
         watch: what may go into each other.
         stopped: whether a guard stopped the run.
         origin: when the times that are told begin [s].
+        rigid: extremes of rigid bodies and their joints; None without such bodies.
     """
 
     start: HandOff
@@ -150,6 +152,7 @@ class Finished(Context):
     watch: Watch
     stopped: bool
     origin: float
+    rigid: RigidExtremes | None = None
 
 
 def listed_passes(scene: Scene, model: Model) -> Iterator[tuple[int, ContactPass, Contact]]:

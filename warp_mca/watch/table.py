@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warp_mca.watch import (
+    articulations,
     bending,
     contacts,
     elements,
@@ -36,7 +37,7 @@ def _rows(*modules: ModuleType) -> tuple[Row, ...]:
 
 
 FIGURES = _rows(elements, inertia, bending, energy, contacts, motion)
-SCENES = _rows(meshes, units)
+SCENES = _rows(meshes, units, articulations)
 EVENTS = _rows(passing, histories, vibration)
 TABLE = (*_rows(guards), *FIGURES, *SCENES, *EVENTS)
 

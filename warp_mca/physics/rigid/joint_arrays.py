@@ -43,6 +43,11 @@ class JointState:
         drive: torque or force of each motor, summed over the steps [N m s], [N s], shape (rate_count,), float64.
         clock: steps that each joint has taken [-], shape (joint_count,), int32.
         held: torque or force of motors that a function gives [N m], [N], shape (rate_count,), float64.
+        alone: least part of the screw of a freedom that others of its joint did not make, and the step of it [-], shape
+            (joint_count,), vec2d.
+        rank: at the first joint of each group of bodies: number of independent rows that hold its joints, the least
+            part of one that others do not hold, both at the start, the least part so far over that one, 0 where rows
+            became fewer, and the step of it [-], shape (joint_count,), vec4d.
     """
 
     position: wp.array
@@ -54,6 +59,8 @@ class JointState:
     drive: wp.array
     clock: wp.array
     held: wp.array
+    alone: wp.array
+    rank: wp.array
 
 
 class JointArrays:
@@ -134,7 +141,7 @@ class JointArrays:
         step.worst = wp.zeros(groups, dtype=wp.float64)
         for name in ("change", "ahead", "behind", "torque", "drag", "hold"):
             setattr(step, name, wp.zeros(rates, dtype=wp.float64))
-        for name in ("work", "heat", "kinetic", "stored", "effort", "seen"):
+        for name in ("work", "heat", "kinetic", "stored", "effort", "seen", "pace"):
             setattr(step, name, wp.zeros(rates, dtype=wp.float64))
         self.step = step
 
@@ -149,12 +156,14 @@ class JointArrays:
             ball=wp.array(at_rest * rates, dtype=wp.quatd),
             impulse=wp.zeros(LOADS * len(self.items), dtype=wp.float64),
             clock=wp.zeros(len(self.items), dtype=wp.int32),
+            alone=wp.array([(1.0, 0.0)] * len(self.items), dtype=wp.vec2d),
+            rank=wp.zeros(len(self.items), dtype=wp.vec4d),
         )
 
     def poses(self, state: State) -> Any:
         """The state as kernels take it."""
         found, own = JointPoses(), state.rigid.joints
-        for name in ("position", "rate", "ball", "work", "heat", "impulse", "drive", "clock", "held"):
+        for name in ("position", "rate", "ball", "work", "heat", "impulse", "drive", "clock", "held", "alone", "rank"):
             setattr(found, name, getattr(own, name))
         return found
 

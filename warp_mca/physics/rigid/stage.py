@@ -44,6 +44,7 @@ class RigidState:
         spin: angular momentum of each body about its mass centre then [kg m^2/s], shape (body_count,), vec3d.
         orientation: rotation of the cluster of each pin in `Model.rigid_pins` since the start [-], shape (pin_count,),
             quatd.
+        turn: greatest turn of each body in a step [rad], shape (body_count,), float64.
         joints: of joints between whole bodies, `JointState`; None without.
     """
 
@@ -52,6 +53,7 @@ class RigidState:
     momentum: wp.array
     spin: wp.array
     orientation: wp.array
+    turn: wp.array
     joints: JointState | None = None
 
 
@@ -166,7 +168,8 @@ class RigidStage(Actor):
         step.rate, step.turned = (wp.zeros(bodies, dtype=wp.mat33d) for _ in range(2))
         step.normal, step.twist = (wp.zeros(size, dtype=wp.vec3d) for _ in range(2))
         step.lever = wp.zeros((size, 2), dtype=wp.vec3d)
-        step.gap, step.value, step.matrix = (wp.zeros(n, dtype=wp.float64) for n in (size, size, self.entries))
+        step.gap, step.value, step.share = (wp.zeros(size, dtype=wp.float64) for _ in range(3))
+        step.matrix = wp.zeros(self.entries, dtype=wp.float64)
         step.mean, step.impulse = wp.zeros(pins, dtype=Mean), wp.zeros((pins, 2), dtype=wp.vec3d)
         step.point, step.place, step.axis = (wp.zeros(pins, dtype=wp.vec3d) for _ in range(3))
         if self.joints:
@@ -178,7 +181,8 @@ class RigidStage(Actor):
         vectors = {name: wp.zeros(self.count, dtype=wp.vec3d) for name in ("centre", "momentum", "spin")}
         turns = {"rotation": wp.array(at_rest, dtype=wp.quatd), "orientation": wp.array(pins, dtype=wp.quatd)}
         joints = self.joints.new_state() if self.count and self.joints else None
-        return RigidState(**turns, **vectors, joints=joints)
+        turn = wp.zeros(self.count, dtype=wp.float64)
+        return RigidState(**turns, **vectors, turn=turn, joints=joints)
 
     def record_kernels(self) -> list[Any]:
         """Those of a step, which have blocks of Warp's own size."""
@@ -216,7 +220,7 @@ class RigidStage(Actor):
         inputs += [*self.nodes.given(state, level), kick, span, moves]
         poses = Poses()
         poses.centre, poses.rotation, poses.momentum = own.centre, own.rotation, own.momentum
-        poses.spin, poses.orientation = own.spin, own.orientation
+        poses.spin, poses.orientation, poses.turn = own.spin, own.orientation, own.turn
         if self.joints:
             poses.joints = self.joints.poses(state)
         outputs, threads = [self.nodes.moved(state), poses, state.constraints.impulse], (self.groups, self.lanes)
