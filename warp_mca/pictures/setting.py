@@ -50,6 +50,14 @@ def view_axes(up: Array, extent: Array | None = None) -> Array:
     return np.array([right, up, viewer])
 
 
+def eye_axes(up: Array, extent: Array) -> Array:
+    """Directions to the right, upwards and to the eye, as rows, shape (3, 3); arguments as in `view_axes`."""
+    eye = EYE / np.linalg.norm(EYE) @ view_axes(up, extent)
+    right = np.cross(up, eye)
+    right /= np.linalg.norm(right)
+    return np.array([right, np.cross(eye, right), eye])
+
+
 @dataclass(frozen=True)
 class PlaneMesh:
     """A part of a rigid plane as a chequered mesh, so that one sees it move.

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from warp_mca.geometry.cell_types import triangulated
 from warp_mca.geometry.creases import Creases
 from warp_mca.pictures.raster import rasterise
-from warp_mca.pictures.setting import EYE, PlaneMesh, rounded, view_axes
+from warp_mca.pictures.setting import PlaneMesh, eye_axes, rounded, view_axes
 from warp_mca.results.figure_style import engineering, new_figure, save_png
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ class Picture:
         if bounds is None:
             points = np.concatenate([skin.points for skin in skins.values()])
             bounds = np.array([points.min(axis=0), points.max(axis=0)])
-        self.look, self.eye = look, _axes_of_view(look.up, bounds)
+        self.look, self.eye = look, eye_axes(np.array(look.up), np.ptp(bounds, axis=0))
         window = (
             np.array([[x, y, z] for x in bounds[:, 0] for y in bounds[:, 1] for z in bounds[:, 2]]) @ self.eye[:2].T
         )
@@ -179,14 +179,6 @@ def field_limit(skins: Mapping[str, Skin], field: str) -> float:
     order = np.argsort(value)
     below = np.cumsum(np.linalg.norm(normal, axis=1)[order])
     return float(value[order][np.searchsorted(below, (1.0 - FIELDS[field].beyond) * below[-1])])
-
-
-def _axes_of_view(up: tuple[float, float, float], bounds: Array) -> Array:
-    """Directions to the right, upwards and to the eye, as rows, shape (3, 3), for what lies in `bounds`."""
-    eye = EYE / np.linalg.norm(EYE) @ view_axes(np.array(up), np.ptp(bounds, axis=0))
-    right = np.cross(up, eye)
-    right /= np.linalg.norm(right)
-    return np.array([right, np.cross(eye, right), eye])
 
 
 def _of_skin(skin: Skin) -> tuple[Array, Array, Array]:
