@@ -7,23 +7,17 @@ import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import warp_mca as mca
 from warp_mca.base.errors import CriterionError, McaError, bad_value
 from warp_mca.base.log import LOGGER
 from warp_mca.cli import part_script, robot_script, sweep
 from warp_mca.cli.accuracy import accuracy_asked
-from warp_mca.cli.own_recorder import own_recorder
+from warp_mca.cli.recorders import recorders_of
 from warp_mca.cli.request import read_request
 from warp_mca.cli.resume import command_of
 from warp_mca.cli.warp_start import start_warp
 from warp_mca.phases.every import DEFAULT, Every
-
-if TYPE_CHECKING:
-    from warp_mca.recorders import Recorder
-
-DRAWING = {"frames": 100, "field": "von_mises", "magnify": 1.0}  # options for recorders, and their defaults
 
 
 def run(args: argparse.Namespace) -> None:
@@ -45,7 +39,7 @@ def run(args: argparse.Namespace) -> None:
     logging.getLogger(LOGGER).setLevel(logging.INFO)  # so that what is about to run is said
     request = read_request(args)
     out = args.out or Path(request.label if args.method == "mca" else f"{request.label}-{args.method}")
-    recorders = _recorders(args, out)
+    recorders = recorders_of(args, out)
     start_warp(*(["scipy.integrate"] if request.scene.rigid else []), "scipy.signal", "matplotlib.backends.backend_agg")
     with _noting_what_is_left(args), progress_bar() as progress:
         result = mca.run(
@@ -79,52 +73,6 @@ def run(args: argparse.Namespace) -> None:
         raise CriterionError("; ".join(failed))
 
 
-def _recorders(args: argparse.Namespace, out: Path) -> list[Recorder]:
-    """The recorders that the arguments ask for."""
-    from warp_mca.recorders import FILES, Cadence, SnapshotFile
-
-    _check_drawing(args)
-    cadence = Cadence(frames=args.frames)
-    drawn = {"field": args.field, "magnify": args.magnify}
-    found: list[Recorder] = []
-    files = {option: list(getattr(args, option)) for option in FILES}
-    if args.viewer == "rerun":
-        first = files["rrd"].pop(0) if files["rrd"] else None
-        found.append(FILES["rrd"].make(first, viewer=True, cadence=cadence))
-    for option, kind in FILES.items():
-        more = {**({"cadence": cadence} if kind.frames else {}), **(drawn if kind.pictures else {})}
-        found += [kind.make(file, **more) for file in files[option]]
-    found += [own_recorder(text, cadence) for text in args.recorders]
-    other = "" if args.field == "von_mises" else f"-{args.field}"
-    return found + [
-        SnapshotFile(out / f"snapshot-{_time_words(t)}{other}.png", time=t, **drawn) for t in args.snapshots
-    ]
-
-
-def _check_drawing(args: argparse.Namespace) -> None:
-    """Refuse options of recorders where no recorder takes them: nothing would come of them.
-
-    Raises:
-        RequestError: so it is.
-    """
-    from warp_mca.recorders import FILES
-
-    kinds = [kind for option, kind in FILES.items() if getattr(args, option)]
-    takers = {
-        "frames": args.viewer != "none" or bool(args.recorders) or any(kind.frames for kind in kinds),
-        "field": bool(args.snapshots) or any(kind.pictures for kind in kinds),
-    }
-    for option, default in DRAWING.items():
-        if getattr(args, option) != default and not takers.get(option, takers["field"]):
-            remedy = "no file that is asked for has frames" if option == "frames" else "no picture or film is asked for"
-            raise bad_value(f"--{option}", getattr(args, option), f"{remedy}; add one, or leave this out")
-
-
-def _time_words(t: float) -> str:
-    """A time [s] in a file's name: in microseconds, as impacts last, or in seconds from 10 ms on."""
-    return f"{t:g}s" if t >= 0.01 else f"{1e6 * t:g}us"
-
-
 def _every(args: argparse.Namespace) -> Every | None:
     """How often the run stores its state, with what `resume` needs; None if that is not asked for."""
     if args.checkpoint is None and args.method == "mca":
@@ -152,7 +100,7 @@ def _sweep(args: argparse.Namespace) -> None:
     """Carry out `--sweep`: as the command `sweep`, with the files of each run kept."""
     if args.accuracy is not None:
         raise bad_value("--accuracy", args.accuracy, "each scene of a sweep would get a model of its own; leave it out")
-    if _recorders(args, Path()):
+    if recorders_of(args, Path()):
         raise bad_value("--sweep", args.sweeps[0], "recorders show single runs; leave them out")
     if args.method != "mca" or args.checkpoint is not None:
         raise bad_value("--sweep", args.sweeps[0], "its runs take no --method and no --checkpoint; leave these out")
