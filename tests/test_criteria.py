@@ -14,6 +14,8 @@ from test_report import Page
 
 import warp_mca as mca
 from warp_mca.cli.main import main
+from warp_mca.cli.parser import make_parser
+from warp_mca.cli.resume import _words, command_of
 from warp_mca.results.criteria import with_verdict
 from warp_mca.scene import model_file
 from warp_mca.scene.criteria import read_criterion
@@ -168,11 +170,21 @@ def test_the_command_exits_with_3_where_one_does_not_hold(scene_file, tmp_path, 
     """Files are written all the same; a criterion that holds leaves the status 0, one that cannot be read 2."""
     out = tmp_path / "out"
     command = ["run", str(scene_file), "--out", str(out), "--force"]
-    assert main([*command, "--criterion", "max_von_mises(cube) < 1e9", "--criterion", "F_n_max < 1"]) == 3
-    assert "F_n_max < 1: not met" in capsys.readouterr().err
-    assert [item["met"] for item in json.loads((out / "summary.json").read_text())["criteria"]] == [True, False]
-    assert main([*command, "--criterion", "max_von_mises(cube) < 1e9"]) == 0
+    assert main([*command, "--json", "--criterion", "max_von_mises(cube) < 1e9", "--criterion", "F_n_max < 1"]) == 3
+    said, told = capsys.readouterr()
+    assert "F_n_max < 1: not met" in told
+    assert json.loads(said) == json.loads((out / "summary.json").read_text())
+    assert [item["met"] for item in json.loads(said)["criteria"]] == [True, False]
+    assert main([*command, "--quiet", "--criterion", "max_von_mises(cube) < 1e9"]) == 0
+    said, told = capsys.readouterr()
+    assert said == "" and all(line.startswith("warning: ") for line in told.splitlines())
     assert main([*command, "--criterion", "max_von_mises(cub) < 1e9"]) == 2
+
+
+def test_a_run_that_goes_on_keeps_them(scene_file):
+    words = ["run", str(scene_file), "--checkpoint", "10", "--criterion", "F_n_max < 1", "--criterion", "F_max > 2"]
+    stored = command_of(make_parser().parse_args(words))
+    assert {"--criterion=F_n_max < 1", "--criterion=F_max > 2", "--checkpoint=10"} <= {*_words(stored, Path())}
 
 
 def test_a_sweep_says_which_runs_do_not_meet_theirs(scene_file, tmp_path):

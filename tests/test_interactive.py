@@ -12,7 +12,7 @@ from matplotlib import colormaps
 import warp_mca as mca
 from warp_mca.base.errors import RequestError
 from warp_mca.pictures.interactive import plotter
-from warp_mca.recorders import View, VtkHdfFile
+from warp_mca.recorders import Cadence, View, VtkHdfFile
 from warp_mca.results.figure_style import engineering
 
 BELT = mca.RigidPlane(point=(0.0, 0.0, -0.001), normal=(0.0, 0.0, 1.0), velocity=(2.0, 0.0, 0.0))
@@ -57,6 +57,18 @@ def test_the_picture_stands_upright_on_its_floor(file: Path):
     assert bodies.bounds[4] == pytest.approx(0.0, abs=1e-9)
     speed = np.asarray(bodies.point_data["speed [m/s]"])
     np.testing.assert_allclose(speed, 3.0, rtol=1e-6)
+    picture.close()
+
+
+def test_a_recording_of_one_frame_is_drawn_at_its_time(tmp_path: Path, bars: FlyingBars):
+    pytest.importorskip("pyvista")
+    recorder = VtkHdfFile(tmp_path / "one.vtkhdf", cadence=Cadence(times=(2e-6,)))
+    recorder.start(bars.info)
+    recorder.frame(bars.frame(2))
+    recorder.finish(True)
+    picture = plotter(tmp_path / "one.vtkhdf", time=0.0, off_screen=True)
+    points = np.asarray(picture.actors["bodies"].mapper.dataset.points)
+    assert points[:, 0].min() == pytest.approx(3.0 * bars.frame(2).time, rel=1e-5)
     picture.close()
 
 

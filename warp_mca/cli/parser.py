@@ -130,6 +130,9 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument("--out", type=folder, metavar="DIR", help="folder for the results (default: SCENE-PRESET)")
     group.add_argument("--force", action="store_true", help="replace results that the folder holds already")
+    said = group.add_mutually_exclusive_group()
+    said.add_argument("--quiet", action="store_true", help="say nothing but warnings and errors")
+    said.add_argument("--json", action="store_true", help="print summary.json in place of a table, for scripts")
     example = "two_link --viewer rerun --usd impact.usdc --snapshot 60e-6; options with FILE may be given several times"
     recorders.add_options(_group(parser, "see the run", example))
     parser.set_defaults(command=run.run)

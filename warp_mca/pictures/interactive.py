@@ -17,6 +17,10 @@ from warp_mca.pictures.snapshot import FIELDS
 from warp_mca.results.figure_style import engineering
 from warp_mca.scene import RigidPlane
 
+BAR: dict[str, Any] = {  # beside the bodies
+    **{"vertical": True, "position_x": 0.84, "position_y": 0.2, "height": 0.6},
+    **{"fmt": "%.4g", "title_font_size": 13, "label_font_size": 13},
+}
 STEEP = 0.99  # cosine between the way up and the eye, from which on the picture's own upwards is taken
 
 if TYPE_CHECKING:
@@ -56,12 +60,13 @@ def plotter(
         raise RequestError(f"pyvista cannot be imported ({error}): install it with pip install pyvista") from error
     mesh, at = _read(Path(file), time)
     mesh = _without(mesh, Path(file), view)
-    size = {"window_size": (view.pixels, round(0.75 * view.pixels))} if view.pixels else {}
+    size: dict[str, Any] = {"window_size": (view.pixels, round(0.75 * view.pixels))} if view.pixels else {}
     found = pv.Plotter(**(size | options))
     points = _places(mesh, magnify)
     mesh.points = points
     title, colours, limit = _coloured(mesh, field)
-    look = {"cmap": colours, "clim": (0.0, limit or 1.0), "split_sharp_edges": True, "smooth_shading": True}
+    look: dict[str, Any] = {"cmap": colours, "clim": (0.0, limit or 1.0), "scalar_bar_args": BAR}
+    look |= {"split_sharp_edges": True, "smooth_shading": True}
     found.add_mesh(mesh, name="bodies", scalars=title, **look)
     up = np.asarray(mesh.field_data["up"], dtype=float).ravel()
     for k, plane in enumerate(_planes(mesh, points, up)):
@@ -97,14 +102,15 @@ def _without(mesh: pyvista.DataSet, path: Path, view: View) -> pyvista.DataSet:
     Raises:
         RequestError: the recording has no such body, or no other.
     """
+    if not view.hidden:
+        return mesh
     import h5py
 
-    with h5py.File(path) as file:
-        names = [str(name) for name in file["VTKHDF/CellData/body"].attrs["names"]]
+    with h5py.File(path, locking=False) as file:  # a run may be writing it
+        stored: Any = file["VTKHDF/CellData/body"].attrs["names"]
+        names = [str(name) for name in stored]
     view.check(names)
     hidden = [names.index(name) for name in view.hidden]
-    if not hidden:
-        return mesh
     kept = mesh.extract_cells(~np.isin(mesh.cell_data["body"], hidden))
     for name in mesh.field_data:
         kept.field_data[name] = mesh.field_data[name]
@@ -128,7 +134,7 @@ def _read(path: Path, time: float | None) -> tuple[pyvista.DataSet, float]:
         raise bad_value("file", str(path), "give a recording that VtkHdfFile or --vtkhdf wrote")
     reader.SetFileName(str(path))
     reader.UpdateInformation()
-    times = np.array(reader.GetOutputInformation(0).Get(vtkStreamingDemandDrivenPipeline.TIME_STEPS()))
+    times = np.array(reader.GetOutputInformation(0).Get(vtkStreamingDemandDrivenPipeline.TIME_STEPS()) or _times(path))
     step = len(times) - 1 if time is None else int(np.argmin(np.abs(times - time)))
     reader.SetStep(step)
     reader.Update()
@@ -136,6 +142,15 @@ def _read(path: Path, time: float | None) -> tuple[pyvista.DataSet, float]:
     if "up" not in mesh.field_data:
         raise bad_value("file", str(path), "it does not say which way is up; record it again with this version")
     return mesh, float(times[step])
+
+
+def _times(path: Path) -> list[float]:
+    """Times of the frames [s], which the reader does not tell of a single one."""
+    import h5py
+
+    with h5py.File(path, locking=False) as file:
+        stored: Any = file["VTKHDF/Steps/Values"]
+        return [float(time) for time in stored]
 
 
 def _places(mesh: pyvista.DataSet, magnify: float) -> NDArray[np.float64]:

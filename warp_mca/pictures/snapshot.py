@@ -150,7 +150,9 @@ class Picture:
         on_screen[:, :, 0] = (on_screen[:, :, 0] - self.low[0]) * width / size[0]
         on_screen[:, :, 1] = (self.high[1] - on_screen[:, :, 1]) * height / size[1]
         seen = rasterise(on_screen, int(width), int(height))
-        towards = LIGHT / np.linalg.norm(LIGHT) @ view_axes(np.array(self.look.up))
+        up = np.array(self.look.up)
+        level = view_axes(up) if self.look.camera is None else [self.eye[0], up, np.cross(self.eye[0], up)]
+        towards = LIGHT / np.linalg.norm(LIGHT) @ level
         bright = AMBIENT + (1.0 - AMBIENT) * np.clip(normals @ towards, 0.0, 1.0)
         value, bright = seen.interpolated(np.stack([value, bright], axis=2)).T
         share = np.asarray(self.colours.norm(self.scale * np.maximum(value, 0.0)))
