@@ -7,11 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from flying_bars import FlyingBars
+from matplotlib import colormaps
 
 import warp_mca as mca
 from warp_mca.base.errors import RequestError
 from warp_mca.pictures.interactive import plotter
-from warp_mca.recorders import VtkHdfFile
+from warp_mca.recorders import Cadence, View, VtkHdfFile
+from warp_mca.results.figure_style import engineering
 
 BELT = mca.RigidPlane(point=(0.0, 0.0, -0.001), normal=(0.0, 0.0, 1.0), velocity=(2.0, 0.0, 0.0))
 
@@ -55,6 +57,36 @@ def test_the_picture_stands_upright_on_its_floor(file: Path):
     assert bodies.bounds[4] == pytest.approx(0.0, abs=1e-9)
     speed = np.asarray(bodies.point_data["speed [m/s]"])
     np.testing.assert_allclose(speed, 3.0, rtol=1e-6)
+    picture.close()
+
+
+def test_a_recording_of_one_frame_is_drawn_at_its_time(tmp_path: Path, bars: FlyingBars):
+    pytest.importorskip("pyvista")
+    recorder = VtkHdfFile(tmp_path / "one.vtkhdf", cadence=Cadence(times=(2e-6,)))
+    recorder.start(bars.info)
+    recorder.frame(bars.frame(2))
+    recorder.finish(True)
+    picture = plotter(tmp_path / "one.vtkhdf", time=0.0, off_screen=True)
+    points = np.asarray(picture.actors["bodies"].mapper.dataset.points)
+    assert points[:, 0].min() == pytest.approx(3.0 * bars.frame(2).time, rel=1e-5)
+    picture.close()
+
+
+def test_stress_is_in_the_units_and_colours_of_other_pictures(file: Path):
+    """MPa or what has few digits, on the square-root scale; hidden bodies are not there, the camera where asked."""
+    pytest.importorskip("pyvista")
+    picture = plotter(file, view=View(hidden=("upper bar",), camera=(0.0, 0.0, 1.0), pixels=400), off_screen=True)
+    bodies = picture.actors["bodies"].mapper
+    (title,) = (name for name in bodies.dataset.point_data if name.startswith("von Mises stress"))
+    scale, unit = engineering(float(np.quantile(bodies.dataset.point_data["von_mises"], 0.995)), "Pa")
+    assert title == f"von Mises stress [{unit}]"
+    np.testing.assert_allclose(bodies.dataset.point_data[title], scale * bodies.dataset.point_data["von_mises"])
+    assert set(bodies.dataset.cell_data["body"]) == {1}
+    quarter = bodies.lookup_table.map_value(0.25 * bodies.scalar_range[1])
+    np.testing.assert_allclose(quarter[:3], np.array(colormaps["viridis"](0.5))[:3], atol=0.02)
+    direction = np.array(picture.camera.position) - np.array(picture.camera.focal_point)
+    np.testing.assert_allclose(direction / np.linalg.norm(direction), [0.0, 0.0, 1.0], atol=1e-6)
+    assert tuple(picture.window_size) == (400, 300)
     picture.close()
 
 

@@ -8,16 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 from flying_bars import FlyingBars
+from PIL import Image
 from test_full_disk import files_up_to
 
 import warp_mca as mca
 from warp_mca.base.errors import RequestError
 from warp_mca.base.rotation import rotation_matrix
-from warp_mca.cli import run
 from warp_mca.cli.parser import make_parser
+from warp_mca.cli.recorders import recorders_of
 from warp_mca.pictures.magnify import magnified
 from warp_mca.pictures.snapshot import FIELDS, Look, Picture, Skin, field_limit
-from warp_mca.recorders import AnimationFile, SnapshotFile
+from warp_mca.recorders import AnimationFile, SnapshotFile, View
 from warp_mca.recorders.pictures import Subject
 from warp_mca.recorders.recorder import SURFACE, VOLUME
 
@@ -169,10 +170,48 @@ def test_what_ffmpeg_says_is_told(bars: FlyingBars, tmp_path: Path, monkeypatch:
 
 def test_the_command_line_draws_what_is_asked_for(tmp_path: Path):
     words = ["run", "two_link", "--snapshot", "5e-6", "--animate", str(tmp_path / "a.gif"), "--frames", "7"]
-    args = make_parser().parse_args([*words, "--field", "velocity", "--magnify", "30"])
-    animation, snapshot = run._recorders(args, tmp_path)
+    args = make_parser().parse_args(
+        [*words, "--field", "velocity", "--magnify", "30", "--hide", "plate", "--camera=-1,0,0"]
+    )
+    animation, snapshot = recorders_of(args, tmp_path)
     assert isinstance(animation, AnimationFile) and isinstance(snapshot, SnapshotFile)
     assert animation.cadence.frames == 7
     assert snapshot.path.name == "snapshot-5us-velocity.png"
     for recorder in (animation, snapshot):
         assert (recorder.subject.field, recorder.subject.magnify) == ("velocity", 30.0)
+        assert recorder.subject.view == View(camera=(-1.0, 0.0, 0.0), hidden=("plate",))
+
+
+def test_a_view_says_size_camera_and_hidden_bodies(bars: FlyingBars, tmp_path: Path):
+    """From above, a bar that is alone covers its length by its width; twice the pixels make twice the picture."""
+    subject = Subject(view=View(camera=(0.0, 1.0, 0.0), hidden=("upper bar",), pixels=300))
+    subject.check(bars.info)
+    skins = subject.skins(bars.info, bars.frame(1))
+    assert list(skins) == ["lower"]
+    picture = Picture(skins, 0.0, subject.look(bars.info, skins))
+    np.testing.assert_allclose(np.abs(picture.eye[2]), [0.0, 1.0, 0.0], atol=1e-12)
+    margin = 0.1 * np.ptp(skins["lower"].points, axis=0).max()
+    seen = sorted(np.ptp(skins["lower"].points, axis=0)[[0, 2]] + margin)
+    np.testing.assert_allclose(sorted(picture.high - picture.low), seen, rtol=1e-6)
+    assert max(picture.image.get_array().shape[:2]) == 300
+    sizes = []
+    for pixels in (200, 400):
+        recorder = SnapshotFile(tmp_path / f"{pixels}.png", time=0.0, view=View(pixels=pixels))
+        recorder.start(bars.info)
+        recorder.frame(bars.frame(0))
+        sizes.append(Image.open(recorder.path).size)
+    np.testing.assert_allclose(sizes[1], 2 * np.array(sizes[0]), atol=2)
+
+
+@pytest.mark.parametrize(
+    ("given", "why"),
+    [
+        ({"pixels": 10}, "View.pixels = 10: give a whole number from 50 to 8000"),
+        ({"camera": (0.0, 0.0, 0.0)}, r"View.camera = \(0.0, 0.0, 0.0\): give a direction other than zero"),
+        ({"hidden": ("ball",)}, "View.hidden = 'ball': choose among"),
+        ({"hidden": ("upper bar", "lower")}, "nothing would be left to show"),
+    ],
+)
+def test_views_that_show_nothing_are_refused(bars: FlyingBars, given: dict, why: str):
+    with pytest.raises(RequestError, match=why):
+        View(**given).check(bars.info.surfaces)

@@ -26,3 +26,4 @@ def draw_nothing(patch: pytest.MonkeyPatch) -> None:
 
     patch.setattr(ConstrainedLayoutEngine, "execute", lambda self, figure: None)
     patch.setattr(FigureCanvasAgg, "print_png", write)
+    patch.setattr("warp_mca.pictures.mesh_picture.mesh_png", lambda *skins, **options: PNG)

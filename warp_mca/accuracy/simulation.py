@@ -27,6 +27,7 @@ from warp_mca.phases.meshing import mesh
 from warp_mca.phases.prepare import Clock, Request
 from warp_mca.phases.settings import settings_of
 from warp_mca.phases.simulate import simulate
+from warp_mca.recorders.portrait import Portrait
 from warp_mca.recorders.recorder import Recorder
 from warp_mca.results.criteria import with_verdict
 from warp_mca.results.result import Result
@@ -91,15 +92,14 @@ def run(
     """
     check_scene("scene", scene)
     scene = with_options(scene, refine, mass_scaling, meshes)
-    tell, span = teller(progress), span_of(scene, duration)
-    settings = settings_of(device, precision, threads, multi_rate)
+    span, settings = span_of(scene, duration), settings_of(device, precision, threads, multi_rate)
     _check_files(recorders, out, force)
-    every = _every(method, checkpoint, out, scene, recorders, accuracy)
+    every, shown = _every(method, checkpoint, out, scene, recorders, accuracy), Portrait(recorders)
+    request = Request(span=span, settings=settings, tell=teller(progress), recorders=recorders, begun=shown.take)
     typed = {"refine": refine, "mass_scaling": mass_scaling, "multi_rate": multi_rate}
     again = partial(run, device=device, precision=precision, threads=threads, duration=duration)
     plan = planned(scene, accuracy, typed, device, meshes, again)
-    request = Request(span=span, settings=settings, tell=tell, recorders=recorders)
-    return run_planned(plan, partial(_kept, partial(_judged, scene, meshes, method, request), out, force, every))
+    return run_planned(plan, partial(_kept, partial(_judged, scene, meshes, method, request), shown, out, force, every))
 
 
 def _every(
@@ -125,12 +125,15 @@ def _every(
 
 def _kept(
     result: Callable[[Checkpoint | None, Plan | None], Result],
+    shown: Portrait,
     out: str | os.PathLike[str] | None,
     force: bool,
     every: Every | None,
     plan: Plan | None,
 ) -> Result:
     """What came of a run, which holds its folder meanwhile if it writes to one; arguments as in `run`.
+
+    `shown` has the pictures of the report.
 
     Raises:
         RequestError: the folder cannot be used.
@@ -139,7 +142,8 @@ def _kept(
         return result(None, plan)
     with hold(out, force=force) as folder:
         store = Checkpoint(folder.path, every, force) if every else None
-        found = write(result(store, plan), folder, force=force)
+        found = result(store, plan)
+        found = write(found, folder, force=force, images=partial(shown.images, found.failed))
         if store:
             store.remove()
         return found

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import warp_mca as mca
-from warp_mca.cli import commands, paper, resume, run, sweep, tradeoff
+from warp_mca.cli import commands, paper, recorders, resume, run, sweep, tradeoff
 from warp_mca.cli.accuracy import add_accuracy
 from warp_mca.cli.folder import folder
 from warp_mca.phases.every import METHODS
@@ -130,7 +130,11 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument("--out", type=folder, metavar="DIR", help="folder for the results (default: SCENE-PRESET)")
     group.add_argument("--force", action="store_true", help="replace results that the folder holds already")
-    _add_recorders(parser)
+    said = group.add_mutually_exclusive_group()
+    said.add_argument("--quiet", action="store_true", help="say nothing but warnings and errors")
+    said.add_argument("--json", action="store_true", help="print summary.json in place of a table, for scripts")
+    example = "two_link --viewer rerun --usd impact.usdc --snapshot 60e-6; options with FILE may be given several times"
+    recorders.add_options(_group(parser, "see the run", example))
     parser.set_defaults(command=run.run)
 
 
@@ -244,54 +248,3 @@ def _add_scene(parser: argparse.ArgumentParser, more: str = "") -> None:
     group.add_argument("--set", dest="settings", action="append", default=[], metavar="KEY=VALUE", help=help_text)
     help_text = "what must hold, as 'max_von_mises(shell) < 60e6', else exit status 3; once for each"
     group.add_argument("--criterion", dest="criteria", action="append", default=[], metavar="TEXT", help=help_text)
-
-
-def _add_recorders(parser: argparse.ArgumentParser) -> None:
-    from warp_mca.pictures.snapshot import FIELDS
-    from warp_mca.recorders import FILES
-
-    example = "two_link --viewer rerun --usd impact.usdc --snapshot 60e-6; options with FILE may be given several times"
-    group = _group(parser, "see the run", example)
-    group.add_argument(
-        "--viewer", default="none", choices=("rerun", "none"), help="open a viewer and stream to it (default: none)"
-    )
-    for option, kind in FILES.items():
-        group.add_argument(f"--{option}", metavar="FILE", type=Path, action="append", default=[], help=kind.help)
-    group.add_argument(
-        "--recorder",
-        dest="recorders",
-        action="append",
-        default=[],
-        metavar="MODULE:NAME[,KEY=VALUE…]",
-        help="a recorder of your own, the class NAME of a module here; may be given several times",
-    )
-    group.add_argument(
-        "--frames",
-        type=int,
-        default=run.DRAWING["frames"],
-        metavar="N",
-        help="frames of each file (default: %(default)s)",
-    )
-    group.add_argument(
-        "--snapshot",
-        dest="snapshots",
-        type=float,
-        action="append",
-        default=[],
-        metavar="SECONDS",
-        help="draw the bodies at this time after first contact; may be given several times",
-    )
-    group.add_argument(
-        "--field",
-        default=run.DRAWING["field"],
-        choices=tuple(FIELDS),
-        metavar="FIELD",
-        help="what colours --snapshot and --animate: %(choices)s (default: %(default)s)",
-    )
-    group.add_argument(
-        "--magnify",
-        type=float,
-        default=run.DRAWING["magnify"],
-        metavar="F",
-        help="draw F times the deformation there (default: 1)",
-    )

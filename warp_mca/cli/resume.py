@@ -27,6 +27,7 @@ OPTIONS: dict[str, tuple[type, ...]] = {
     "refine": (float,),
     "element": (str,),
     "set": (list,),
+    "criterion": (list,),
     "device": (str,),
     "precision": (str,),
     "threads": (int,),
@@ -38,6 +39,8 @@ OPTIONS: dict[str, tuple[type, ...]] = {
     "checkpoint": (str,),
 }
 
+LISTED = {"set": "settings", "criterion": "criteria"}  # attributes of those that are given once for each
+
 
 def command_of(args: argparse.Namespace) -> dict[str, Any]:
     """What `resume` needs of the command `run`: its scene, the digest of its file if it is one, its options.
@@ -45,7 +48,7 @@ def command_of(args: argparse.Namespace) -> dict[str, Any]:
     Raises:
         OSError: the file is gone.
     """
-    given = {name: getattr(args, "settings" if name == "set" else name) for name in OPTIONS}
+    given = {name: getattr(args, LISTED.get(name, name)) for name in OPTIONS}
     options = {name: value for name, value in given.items() if value not in (None, [])}
     more = {"options": options, "imports": _imports(args.imports)}
     if not _is_file(args.scene):

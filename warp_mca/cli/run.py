@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 import logging
-from collections.abc import Iterator
-from contextlib import contextmanager
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,24 +15,21 @@ from warp_mca.base.errors import CriterionError, McaError, bad_value
 from warp_mca.base.log import LOGGER
 from warp_mca.cli import part_script, robot_script, sweep
 from warp_mca.cli.accuracy import accuracy_asked
-from warp_mca.cli.own_recorder import own_recorder
-from warp_mca.cli.request import read_request
+from warp_mca.cli.recorders import recorders_of
+from warp_mca.cli.request import Request, read_request
 from warp_mca.cli.resume import command_of
 from warp_mca.cli.warp_start import start_warp
 from warp_mca.phases.every import DEFAULT, Every
 
 if TYPE_CHECKING:
     from warp_mca.recorders import Recorder
-
-DRAWING = {"frames": 100, "field": "von_mises", "magnify": 1.0}  # options for recorders, and their defaults
+    from warp_mca.results.result import Result
 
 
 def run(args: argparse.Namespace) -> None:
     """Run a scene or a sweep, and print what came of it; of a part or a robot, print a scene file."""
     from warp_mca.base.progress import progress_bar
-    from warp_mca.cli.console import print_summary
     from warp_mca.results.criteria import unmet
-    from warp_mca.results.storage import CONTACT_FILES, FILES, PATH_FILES, PROBE_FILES
 
     if args.sweeps:
         _sweep(args)
@@ -42,12 +40,13 @@ def run(args: argparse.Namespace) -> None:
     if part_script.is_part(args.scene):
         part_script.print_script(args.scene)
         return
-    logging.getLogger(LOGGER).setLevel(logging.INFO)  # so that what is about to run is said
+    if not args.quiet:
+        logging.getLogger(LOGGER).setLevel(logging.INFO)  # so that what is about to run is said
     request = read_request(args)
     out = args.out or Path(request.label if args.method == "mca" else f"{request.label}-{args.method}")
-    recorders = _recorders(args, out)
+    recorders = recorders_of(args, out)
     start_warp(*(["scipy.integrate"] if request.scene.rigid else []), "scipy.signal", "matplotlib.backends.backend_agg")
-    with _noting_what_is_left(args), progress_bar() as progress:
+    with _noting_what_is_left(args), nullcontext() if args.quiet else progress_bar() as progress:
         result = mca.run(
             request.scene,
             device=args.device,
@@ -64,65 +63,33 @@ def run(args: argparse.Namespace) -> None:
             method=args.method,
             checkpoint=_every(args),
         )
-    written = [*FILES, *(CONTACT_FILES if result.contacts else ()), *(PATH_FILES if result.paths else ())]
-    written += PROBE_FILES if result.probes or result.sections else ()
-    recorded = [r.name for r in recorders if r.name not in result.failed and Path(r.name).exists()]
-    print_summary(result, [*(str(out / name) for name in written), *recorded])
-    changed = (args.duration, args.time_step_scale, args.refine, args.mass_scaling, args.accuracy)
-    as_designed = not args.settings and all(value is None for value in changed)
-    if request.source and as_designed:
-        for message in request.source.findings(result):
-            print(f"check: {message}")
+    _tell(args, request, result, out, recorders)
     if result.failed:
         raise McaError(f"{', '.join(result.failed)}: not written whole, as the warnings say; all else is")
     if failed := unmet(result.summary):
         raise CriterionError("; ".join(failed))
 
 
-def _recorders(args: argparse.Namespace, out: Path) -> list[Recorder]:
-    """The recorders that the arguments ask for."""
-    from warp_mca.recorders import FILES, Cadence, SnapshotFile
+def _tell(args: argparse.Namespace, request: Request, result: Result, out: Path, recorders: Sequence[Recorder]) -> None:
+    """Print what came of a run: figures, warnings and files; with --json its summary; with --quiet warnings alone."""
+    from warp_mca.base.log import warn
+    from warp_mca.cli.console import print_summary
+    from warp_mca.results.storage import CONTACT_FILES, FILES, PATH_FILES, PROBE_FILES
 
-    _check_drawing(args)
-    cadence = Cadence(frames=args.frames)
-    drawn = {"field": args.field, "magnify": args.magnify}
-    found: list[Recorder] = []
-    files = {option: list(getattr(args, option)) for option in FILES}
-    if args.viewer == "rerun":
-        first = files["rrd"].pop(0) if files["rrd"] else None
-        found.append(FILES["rrd"].make(first, viewer=True, cadence=cadence))
-    for option, kind in FILES.items():
-        more = {**({"cadence": cadence} if kind.frames else {}), **(drawn if kind.pictures else {})}
-        found += [kind.make(file, **more) for file in files[option]]
-    found += [own_recorder(text, cadence) for text in args.recorders]
-    other = "" if args.field == "von_mises" else f"-{args.field}"
-    return found + [
-        SnapshotFile(out / f"snapshot-{_time_words(t)}{other}.png", time=t, **drawn) for t in args.snapshots
-    ]
-
-
-def _check_drawing(args: argparse.Namespace) -> None:
-    """Refuse options of recorders where no recorder takes them: nothing would come of them.
-
-    Raises:
-        RequestError: so it is.
-    """
-    from warp_mca.recorders import FILES
-
-    kinds = [kind for option, kind in FILES.items() if getattr(args, option)]
-    takers = {
-        "frames": args.viewer != "none" or bool(args.recorders) or any(kind.frames for kind in kinds),
-        "field": bool(args.snapshots) or any(kind.pictures for kind in kinds),
-    }
-    for option, default in DRAWING.items():
-        if getattr(args, option) != default and not takers.get(option, takers["field"]):
-            remedy = "no file that is asked for has frames" if option == "frames" else "no picture or film is asked for"
-            raise bad_value(f"--{option}", getattr(args, option), f"{remedy}; add one, or leave this out")
-
-
-def _time_words(t: float) -> str:
-    """A time [s] in a file's name: in microseconds, as impacts last, or in seconds from 10 ms on."""
-    return f"{t:g}s" if t >= 0.01 else f"{1e6 * t:g}us"
+    if args.json:
+        print((out / "summary.json").read_text(encoding="utf-8"), end="")
+    elif args.quiet:
+        warn(result.warnings)
+    else:
+        written = [*FILES, *(CONTACT_FILES if result.contacts else ()), *(PATH_FILES if result.paths else ())]
+        written += PROBE_FILES if result.probes or result.sections else ()
+        recorded = [r.name for r in recorders if r.name not in result.failed and Path(r.name).exists()]
+        print_summary(result, [*(str(out / name) for name in written), *recorded])
+    changed = (args.duration, args.time_step_scale, args.refine, args.mass_scaling, args.accuracy)
+    as_designed = not args.settings and all(value is None for value in changed)
+    if request.source and as_designed:
+        for message in request.source.findings(result):
+            print(f"check: {message}", file=sys.stderr if args.json or args.quiet else sys.stdout)
 
 
 def _every(args: argparse.Namespace) -> Every | None:
@@ -152,8 +119,10 @@ def _sweep(args: argparse.Namespace) -> None:
     """Carry out `--sweep`: as the command `sweep`, with the files of each run kept."""
     if args.accuracy is not None:
         raise bad_value("--accuracy", args.accuracy, "each scene of a sweep would get a model of its own; leave it out")
-    if _recorders(args, Path()):
+    if recorders_of(args, Path()):
         raise bad_value("--sweep", args.sweeps[0], "recorders show single runs; leave them out")
     if args.method != "mca" or args.checkpoint is not None:
         raise bad_value("--sweep", args.sweeps[0], "its runs take no --method and no --checkpoint; leave these out")
+    if args.quiet or args.json:
+        raise bad_value("--sweep", args.sweeps[0], "--quiet and --json are for single runs; leave these out")
     sweep.sweep(args, "--sweep", args.sweeps, folders=True)

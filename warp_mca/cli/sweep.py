@@ -126,6 +126,7 @@ def _print(plan: Plan, rows: Sequence[Row]) -> None:
     from rich.table import Table
 
     from warp_mca.base.console import console
+    from warp_mca.results.report import REPORT
     from warp_mca.studies.sweep_job import BETWEEN, COMPLETE
     from warp_mca.studies.sweep_table import CSV, PARQUET
 
@@ -156,6 +157,6 @@ def _print(plan: Plan, rows: Sequence[Row]) -> None:
         out.print(f"and {len(said) - WARNINGS} more warnings, in the column warnings of {CSV}")
     wall = sum({row["wall"] for row in rows if row.get("wall")})  # runs of a batch have the same
     out.print(f"wall time of all runs {wall:.1f} s, on {plan.options.device}, {plan.options.precision}")
-    for name in (CSV, PARQUET):
+    for name in (CSV, PARQUET, REPORT):
         if plan.out and (plan.out / name).exists():
             out.print(f"wrote {plan.out / name}", soft_wrap=True)

@@ -85,6 +85,7 @@ class Request:
         recorders: of a lone scene.
         store: where a lone scene stores its state, and from which it goes on; None for never.
         clock: wall time by stage.
+        begun: told of the scene, its model and its meshes by body, each time a model is assembled.
     """
 
     span: float
@@ -93,6 +94,7 @@ class Request:
     recorders: Sequence[Recorder] = ()
     store: Checkpoint | None = None
     clock: Clock = field(default_factory=Clock)
+    begun: Callable[[Scene, Model, Mapping[str, Mesh]], None] = lambda scene, model, meshes: None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,6 +149,7 @@ class Setup:
         probes = locate(scene, model, meshes, self.places)
         warnings = told_before(scene, meshes, model) if said else ()
         check_range(model, settings.precision)
+        self.request.begun(scene, model, meshes)
         self.request.clock.lap("mesh")
         return Prepared(scene, meshes, start or self.start, model, probes, self.sensors, warnings)
 

@@ -1,21 +1,68 @@
-"""Owns what stands around the bodies in pictures: which way is up, where the eye is, and rigid planes as meshes."""
+"""Owns the setting of pictures: which way is up, where the eye is, what is shown how large, rigid planes as meshes."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base import validate
+from warp_mca.base.errors import bad_value
 from warp_mca.scene import RigidPlane, Scene
 
 Array = NDArray[np.floating]
 
 EYE = np.array([0.30, 0.35, 0.89])  # direction to the eye: right, upwards and to the viewer
+PIXELS = (50, 8000)  # least and most along the longer side of a picture
 CHECKS = 12  # squares along a side of a plane, at least
 BEYOND = 0.5  # how far a plane reaches beyond the bodies, as a share of their size
 TURN = 1.5  # how many times deeper than wide bodies are that are looked at from the side
+
+
+@dataclass(frozen=True, kw_only=True)
+class View:
+    """What pictures show and from where: snapshots, films and the interactive plotter.
+
+    Attributes:
+        pixels: along the longer side; None for 800, of films 600.
+        camera: direction from the bodies to the eye in the world frame, of any length [-]; None for one from the front
+            right above.
+        hidden: names of bodies that are left out.
+    """
+
+    pixels: int | None = None
+    camera: tuple[float, float, float] | None = None
+    hidden: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        low, high = PIXELS
+        whole = isinstance(self.pixels, int | np.integer) and not isinstance(self.pixels, bool)
+        if self.pixels is not None and not (whole and low <= self.pixels <= high):
+            raise bad_value("View.pixels", validate.brief(self.pixels), f"give a whole number from {low} to {high}")
+        if self.camera is not None:
+            validate.vectors("View", camera=self.camera)
+            if not any(self.camera):
+                raise bad_value("View.camera", self.camera, "give a direction other than zero")
+        validate.kind_of("View.hidden", self.hidden, (tuple, list), 'give a tuple of names, as ("floor",)')
+
+    def check(self, bodies: Iterable[str]) -> None:
+        """Refuse to hide what is not there, or everything.
+
+        Raises:
+            RequestError: so it is.
+        """
+        known = list(bodies)
+        for name in self.hidden:
+            if name not in known:
+                raise bad_value("View.hidden", validate.brief(name), f"choose among {', '.join(known)}")
+        if known and not set(known) - set(self.hidden):
+            raise bad_value("View.hidden", tuple(self.hidden), "nothing would be left to show; leave one out")
+
+
+VIEW = View()
 
 
 def up_of(scene: Scene) -> Array:
@@ -48,6 +95,18 @@ def view_axes(up: Array, extent: Array | None = None) -> Array:
     if extent is not None and np.abs(viewer) @ extent > TURN * (np.abs(right) @ extent):
         right, viewer = -viewer, right
     return np.array([right, up, viewer])
+
+
+def eye_axes(up: Array, extent: Array, camera: tuple[float, float, float] | None = None) -> Array:
+    """Directions to the right, upwards and to the eye, as rows, shape (3, 3); `camera` as in `View`."""
+    axes = view_axes(up, extent)
+    eye = EYE @ axes if camera is None else np.array(camera, dtype=float)
+    eye = eye / np.linalg.norm(eye)
+    right = np.cross(up, eye)
+    if np.linalg.norm(right) < 1e-6:  # from right above or below
+        right = axes[0]
+    right /= np.linalg.norm(right)
+    return np.array([right, np.cross(eye, right), eye])
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from warp_mca.geometry.cell_types import triangulated
 from warp_mca.geometry.creases import Creases
 from warp_mca.pictures.raster import rasterise
-from warp_mca.pictures.setting import EYE, PlaneMesh, rounded, view_axes
-from warp_mca.results.figure_style import engineering, new_figure, save_png
+from warp_mca.pictures.setting import PlaneMesh, eye_axes, rounded, view_axes
+from warp_mca.results.figure_style import DOTS_PER_INCH, engineering, new_figure, save_png
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,6 +25,7 @@ Array = NDArray[np.floating]
 
 LIGHT = np.array([0.35, 0.80, 0.49])  # direction towards the light: right, upwards and to the viewer
 AMBIENT = 0.55  # brightness of a surface turned away from it
+PIXELS = 800  # along the longer side of a picture, unless asked for
 FINER = 2  # times finer it is computed, for smooth edges
 PLANE_LIGHT, PLANE_DARK = (0.88, 0.88, 0.90), (0.78, 0.79, 0.82)  # squares of planes
 
@@ -80,6 +81,7 @@ class Look:
         planes: rigid planes behind the bodies.
         magnify: how many times the shape is magnified, for the title.
         pixels: along the longer side of the picture.
+        camera: direction to the eye, as in `View`.
     """
 
     field: str = "von_mises"
@@ -88,7 +90,8 @@ class Look:
     up: tuple[float, float, float] = (0.0, 1.0, 0.0)
     planes: Sequence[PlaneMesh] = ()
     magnify: float = 1.0
-    pixels: int = 800
+    pixels: int = PIXELS
+    camera: tuple[float, float, float] | None = None
 
 
 class Picture:
@@ -103,7 +106,7 @@ class Picture:
         if bounds is None:
             points = np.concatenate([skin.points for skin in skins.values()])
             bounds = np.array([points.min(axis=0), points.max(axis=0)])
-        self.look, self.eye = look, _axes_of_view(look.up, bounds)
+        self.look, self.eye = look, eye_axes(np.array(look.up), np.ptp(bounds, axis=0), look.camera)
         window = (
             np.array([[x, y, z] for x in bounds[:, 0] for y in bounds[:, 1] for z in bounds[:, 2]]) @ self.eye[:2].T
         )
@@ -147,7 +150,9 @@ class Picture:
         on_screen[:, :, 0] = (on_screen[:, :, 0] - self.low[0]) * width / size[0]
         on_screen[:, :, 1] = (self.high[1] - on_screen[:, :, 1]) * height / size[1]
         seen = rasterise(on_screen, int(width), int(height))
-        towards = LIGHT / np.linalg.norm(LIGHT) @ view_axes(np.array(self.look.up))
+        up = np.array(self.look.up)
+        level = view_axes(up) if self.look.camera is None else [self.eye[0], up, np.cross(self.eye[0], up)]
+        towards = LIGHT / np.linalg.norm(LIGHT) @ level
         bright = AMBIENT + (1.0 - AMBIENT) * np.clip(normals @ towards, 0.0, 1.0)
         value, bright = seen.interpolated(np.stack([value, bright], axis=2)).T
         share = np.asarray(self.colours.norm(self.scale * np.maximum(value, 0.0)))
@@ -166,8 +171,9 @@ def plot_snapshot(skins: Mapping[str, Skin], time: float, look: Look | None = No
 def save_snapshot(
     path: str | os.PathLike[str], skins: Mapping[str, Skin], time: float, look: Look | None = None
 ) -> Path:
-    """Write the figure to `path` as PNG at 200 dots per inch."""
-    return save_png(plot_snapshot(skins, time, look), path)
+    """Write the figure to `path` as PNG, at 200 dots per inch for 800 pixels."""
+    look = look or Look()
+    return save_png(plot_snapshot(skins, time, look), path, DOTS_PER_INCH * look.pixels / PIXELS)
 
 
 def field_limit(skins: Mapping[str, Skin], field: str) -> float:
@@ -179,14 +185,6 @@ def field_limit(skins: Mapping[str, Skin], field: str) -> float:
     order = np.argsort(value)
     below = np.cumsum(np.linalg.norm(normal, axis=1)[order])
     return float(value[order][np.searchsorted(below, (1.0 - FIELDS[field].beyond) * below[-1])])
-
-
-def _axes_of_view(up: tuple[float, float, float], bounds: Array) -> Array:
-    """Directions to the right, upwards and to the eye, as rows, shape (3, 3), for what lies in `bounds`."""
-    eye = EYE / np.linalg.norm(EYE) @ view_axes(np.array(up), np.ptp(bounds, axis=0))
-    right = np.cross(up, eye)
-    right /= np.linalg.norm(right)
-    return np.array([right, np.cross(eye, right), eye])
 
 
 def _of_skin(skin: Skin) -> tuple[Array, Array, Array]:

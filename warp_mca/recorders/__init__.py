@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from warp_mca.recorders.recorder import Cadence, Recorder
 
 if TYPE_CHECKING:
+    from warp_mca.pictures.setting import View
     from warp_mca.recorders.animation_file import AnimationFile
     from warp_mca.recorders.mesh_file import FinalState
     from warp_mca.recorders.rerun_stream import RerunStream
@@ -20,7 +21,7 @@ class Kind(NamedTuple):
     """A recorder that writes a file: its module, its class, and the help of its option on the command line.
 
     Its class is called with the file and, where it takes `frames` during the run, with `cadence`; `pictures` are drawn
-    with `field` and `magnify`, too.
+    with `field`, `magnify` and `view`, too.
     """
 
     module: str
@@ -49,7 +50,10 @@ FILES = {
         "warp_mca.recorders.animation_file", "AnimationFile", "draw a film of the bodies (.gif, .mp4)", pictures=True
     ),
 }
-_MODULES = {kind.name: kind.module for kind in FILES.values()} | {"SnapshotFile": "warp_mca.recorders.snapshot_file"}
+_MODULES = {kind.name: kind.module for kind in FILES.values()} | {
+    "SnapshotFile": "warp_mca.recorders.snapshot_file",
+    "View": "warp_mca.pictures.setting",
+}
 
 __all__ = [
     "Cadence",
@@ -60,6 +64,7 @@ __all__ = [
     "FinalState",
     "SnapshotFile",
     "AnimationFile",
+    "View",
 ]
 
 

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import bad_value
-from warp_mca.recorders.pictures import Subject, for_film
+from warp_mca.pictures.setting import VIEW, View
+from warp_mca.recorders.pictures import FILM_PIXELS, Subject, for_film
 from warp_mca.recorders.recorder import Cadence, FramesOnly, check_file
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 FRAMES = Cadence(frames=100)
 PLAYBACK = 20  # pictures shown in a second
-DOTS_PER_INCH = 100
+DOTS_PER_INCH = 100  # of pictures of FILM_PIXELS
 LAST = 1000  # how long a .gif shows the last picture before it begins again [ms]
 
 
@@ -38,18 +39,23 @@ class AnimationFile(FramesOnly):
         field: str = "von_mises",
         magnify: float = 1.0,
         limit: float | None = None,
+        view: View = VIEW,
     ) -> None:
-        """Draw to `file` (.gif or .mp4); `field`, `magnify` and `limit` as in `Subject`.
+        """Draw to `file` (.gif or .mp4); `field` and the others as in `Subject`.
 
         Raises:
             RequestError: the file cannot be written, a value is not one, or nothing here can make .mp4 files.
         """
         self.path = check_file("animate", file, ".gif", ".mp4")
         self.name, self.files = str(self.path), (self.path,)
-        self.subject = Subject(field, magnify, limit)
+        self.subject = Subject(field, magnify, limit, view)
         self.needs, self.cadence = self.subject.needs, cadence
         self.encoder = _encoder(self.name) if self.path.suffix == ".mp4" else ""
         self._frames: list[tuple[float, dict[str, Skin]]] = []
+
+    def check(self, info: RunInfo) -> None:
+        """Refuse a view that does not suit the bodies."""
+        self.subject.check(info)
 
     def start(self, info: RunInfo) -> None:
         """Keep the faces."""
@@ -89,7 +95,7 @@ class AnimationFile(FramesOnly):
         boxes = np.stack([look.bounds for look in looks if look.bounds is not None])
         bounds = np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
         greatest = max(field_limit(skins, self.subject.field) for _, skins in frames)
-        return for_film(looks[0], bounds, greatest)
+        return for_film(looks[0], bounds, greatest, self.subject.view)
 
 
 def _pictures(frames: list[tuple[float, dict[str, Skin]]], look: Look) -> Iterator[NDArray[np.uint8]]:
@@ -101,7 +107,7 @@ def _pictures(frames: list[tuple[float, dict[str, Skin]]], look: Look) -> Iterat
     picture = Picture(frames[0][1], frames[0][0], look)
     canvas = picture.figure.canvas
     assert isinstance(canvas, FigureCanvasAgg)
-    picture.figure.set_dpi(DOTS_PER_INCH)
+    picture.figure.set_dpi(DOTS_PER_INCH * look.pixels / FILM_PIXELS)
     for k, (time, skins) in enumerate(frames):
         if k:
             picture.draw(skins, time)

@@ -6,6 +6,7 @@ import os
 
 from warp_mca.base.errors import bad_value
 from warp_mca.base.validate import brief, is_number
+from warp_mca.pictures.setting import VIEW, View
 from warp_mca.recorders.pictures import Subject
 from warp_mca.recorders.recorder import Cadence, Frame, FramesOnly, RunInfo, check_file, make_way
 
@@ -21,6 +22,7 @@ class SnapshotFile(FramesOnly):
         field: str = "von_mises",
         magnify: float = 1.0,
         limit: float | None = None,
+        view: View = VIEW,
     ) -> None:
         """Draw to `file` (.png) the state at `time` [s] after first contact; `field` and the others as in `Subject`.
 
@@ -31,9 +33,13 @@ class SnapshotFile(FramesOnly):
             raise bad_value("snapshot", brief(time), "give a finite time from 0 s on")
         self.path = check_file("snapshot", file, ".png")
         self.name, self.files = str(self.path), (self.path,)
-        self.subject = Subject(field, magnify, limit)
+        self.subject = Subject(field, magnify, limit, view)
         self.needs = self.subject.needs
         self.cadence = Cadence(times=(time,))
+
+    def check(self, info: RunInfo) -> None:
+        """Refuse a view that does not suit the bodies."""
+        self.subject.check(info)
 
     def start(self, info: RunInfo) -> None:
         """Keep the faces."""

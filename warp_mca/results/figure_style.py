@@ -40,12 +40,12 @@ def legend_beside(axes: Axes) -> None:
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
 
 
-def save_png(figure: Figure, path: str | os.PathLike[str]) -> Path:
-    """Write the figure to `path` as PNG at 200 dots per inch; its places are final then."""
+def save_png(figure: Figure, path: str | os.PathLike[str], dots_per_inch: float = DOTS_PER_INCH) -> Path:
+    """Write the figure to `path` as PNG; its places are final then."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     engine = figure.get_layout_engine()
-    figure.set_dpi(DOTS_PER_INCH)
+    figure.set_dpi(dots_per_inch)
     if engine is not None:  # figure.savefig would draw everything once more to lay it out
         engine.execute(figure)
         figure.set_layout_engine("none")

@@ -7,7 +7,7 @@ import hashlib
 import json
 import os
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
@@ -21,11 +21,13 @@ from warp_mca.base.validate import DAMAGE
 from warp_mca.results.contact_history import load_contacts, save_contacts
 from warp_mca.results.csv_table import write_table
 from warp_mca.results.force_history import Array
+from warp_mca.results.html_page import Image
 from warp_mca.results.paths import load_paths, save_paths
+from warp_mca.results.report import REPORT, report_html
 from warp_mca.results.result import HISTORY_COLUMNS, Result
 from warp_mca.results.sensor_history import CSV, NPZ, load_sensors, save_sensors
 
-FILES = ("summary.json", "history.csv", "forces.png", "energies.png")
+FILES = ("summary.json", "history.csv", "forces.png", "energies.png", REPORT)
 CONTACT_FILES = ("forces.npz",)  # of scenes with contacts, besides
 PATH_FILES = ("paths.npz", "paths.png", "waves.png")  # of scenes with paths, besides
 PROBE_FILES = (NPZ, CSV, "probes.png")  # of scenes with probes or sections, besides
@@ -68,7 +70,7 @@ def hold(directory: str | os.PathLike[str], *, force: bool = False) -> Iterator[
 
 
 def save(result: Result, directory: str | os.PathLike[str], *, force: bool = False) -> Result:
-    """Write summary.json, history.csv and the figures, all or none of them.
+    """Write summary.json, history.csv, the figures and report.html, all or none of them.
 
     Args:
         result: of a run.
@@ -86,8 +88,10 @@ def save(result: Result, directory: str | os.PathLike[str], *, force: bool = Fal
         return write(result, folder, force=force)
 
 
-def write(result: Result, folder: Folder, *, force: bool = False) -> Result:
-    """As `save`, to a folder that is held already."""
+def write(
+    result: Result, folder: Folder, *, force: bool = False, images: Callable[[], Sequence[Image]] = tuple
+) -> Result:
+    """As `save`, to a folder that is held already; `images` draws those of the bodies for the report."""
     from warp_mca.results.energy_figure import save_energies
     from warp_mca.results.force_figure import save_forces
     from warp_mca.results.path_figures import save_path_figures
@@ -113,6 +117,8 @@ def write(result: Result, folder: Folder, *, force: bool = False) -> Result:
             if result.probes or result.sections:
                 save_sensors(written, result.time, result.probes, result.sections)
                 save_probes(written / "probes.png", shown)
+            text = report_html(result, written, images())
+            (written / REPORT).write_text(text, encoding="utf-8")
             digests = {file.name: _digest(file) for file in sorted(written.iterdir())}
             result = _with_output_time(result, path, time.perf_counter() - begun)
             summary = {**result.summary, "warnings": list(result.warnings), DIGESTS: digests}

@@ -1,6 +1,7 @@
 """Owns criteria: what a figure of a run is to be, as `max_von_mises(shell) < 60e6`, checked against a scene.
 
-A new figure is an entry of `FIGURES`. Without a name in brackets a criterion holds for all that have the figure.
+A new figure is an entry of `FIGURES`. Without a name in brackets a criterion holds for all that have the figure. Behind
+the name, `cfc=1000` filters an acceleration by that channel frequency class [Hz].
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
 from warp_mca.scene.contacts import contact_names
+from warp_mca.scene.sensors import check_class
 from warp_mca.scene.springs import Spring
 
 if TYPE_CHECKING:
@@ -21,16 +23,30 @@ if TYPE_CHECKING:
 
 RELATIONS = {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt}
 _FORM = re.compile(r"\s*(\w+)\s*(?:\((.+)\))?\s*(<=|>=|<|>)\s*(\S+)\s*")
+_FILTERED = re.compile(r"(?:(.*\S)\s*,)?\s*cfc\s*=\s*(\S+)\s*")
 
-# Figures of the summary, under its key that lists what has them by name; "" stands for those of the whole run.
-FIGURES = {
-    "bodies": ("max_von_mises", "max_plastic_strain", "mass"),
-    "probes": ("acceleration_max", "acceleration_cfc_max", "velocity_max", "displacement_end"),
-    "sections": ("F_max", "M_max"),
-    "contacts_by_pair": ("F_max",),
-    "springs": ("force_min", "force_max", "elongation_min", "elongation_max"),
-    "": ("F_n_max", "F_n_first_peak", "contact_duration", "max_strain", "max_penetration", "energy_error"),
+# Figures of the summary and their units, under its key that lists what has them by name; "" stands for those of the
+# whole run. Those of "energy" are computed: shares of the ledger's entries.
+RAW, FILTERED, SHARE = "acceleration_max", "acceleration_cfc_max", "energy_share"
+FIGURES: dict[str, dict[str, str]] = {
+    "bodies": {"max_von_mises": "Pa", "max_plastic_strain": "", "mass": "kg"},
+    "probes": {RAW: "m/s^2", FILTERED: "m/s^2", "velocity_max": "m/s", "displacement_end": "m"},
+    "sections": {"F_max": "N", "M_max": "N m"},
+    "contacts_by_pair": {"F_max": "N"},
+    "joints": {"max_force": "N", "max_moment": "N m"},
+    "springs": {"force_min": "N", "force_max": "N", "elongation_min": "m", "elongation_max": "m"},
+    "bonds": {"failed": ""},
+    "failure": {"elements": ""},
+    "energy": {SHARE: "share"},
+    "": {
+        **{"F_n_max": "N", "F_n_first_peak": "N", "contact_duration": "s"},
+        **{"max_strain": "", "max_penetration": "m", "energy_error": "share"},
+    },
 }
+# Entries of the energy ledger whose share of initial energy and external work a criterion may bound.
+ENERGIES = tuple(
+    "kinetic elastic plastic hourglass contact friction contact_loss damping joint absorbed external_work".split()
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +59,7 @@ class Criterion:
         of: name of what has it, or None for all that do.
         relation: one of `RELATIONS`.
         limit: [SI unit of the figure].
+        cfc: channel frequency class by which an acceleration is filtered [Hz], or None.
     """
 
     text: str
@@ -50,6 +67,12 @@ class Criterion:
     of: str | None
     relation: str
     limit: float
+    cfc: float | None = None
+
+    @property
+    def unit(self) -> str:
+        """Unit of the figure; "share" for shares, "" for other pure numbers."""
+        return next(units[self.figure] for units in FIGURES.values() if self.figure in units)
 
     @property
     def upper(self) -> bool:
@@ -75,13 +98,26 @@ def read_criterion(text: str) -> Criterion:
     figures = list(dict.fromkeys(name for names in FIGURES.values() for name in names))
     if figure not in figures:
         raise bad_value("Scene.criteria", text, f"no figure is named {figure}; choose among {', '.join(figures)}")
-    try:
-        number = float(limit)
-    except ValueError:
-        number = math.nan
+    number = _number(limit)
     if not math.isfinite(number):
         raise bad_value("Scene.criteria", text, f"{limit} is no number; give one in SI units, as 60e6 for 60 MPa")
-    return Criterion(text=text.strip(), figure=figure, of=of and of.strip(), relation=relation, limit=number)
+    filtered, cfc = _FILTERED.fullmatch(of or ""), None
+    if filtered:
+        of, cfc = filtered[1], _number(filtered[2])
+        if figure != RAW:
+            raise bad_value("Scene.criteria", text, f"cfc= filters {RAW} only; leave it out")
+        if not (math.isfinite(cfc) and cfc > 0.0):
+            remedy = f"{filtered[2]} is no channel frequency class; give 60, 180, 600 or 1000 Hz"
+            raise bad_value("Scene.criteria", text, remedy)
+    own = of and of.strip()
+    return Criterion(text=text.strip(), figure=figure, of=own, relation=relation, limit=number, cfc=cfc)
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
 
 
 def check_criteria(scene: Scene) -> None:
@@ -102,16 +138,24 @@ def check_criteria(scene: Scene) -> None:
             raise bad_value("Scene.criteria", text, f"nothing in the scene has {figure}; add what has, or leave it out")
         elif of is not None and of not in known:
             raise bad_value("Scene.criteria", text, f"{of} has no {figure}; choose among {', '.join(known)}")
+        elif of is None and figure == SHARE:
+            raise bad_value("Scene.criteria", text, f"name the energy in brackets: {', '.join(known)}")
+        if criterion.cfc is not None:
+            check_class(f"Scene.criteria: cfc of {text}", criterion.cfc, scene.impact.output_interval)
 
 
 def _names(scene: Scene, figure: str) -> list[str]:
     """What has a figure, by name."""
-    filtered = figure == "acceleration_cfc_max"
-    names = {
+    filtered, names = figure == FILTERED, contact_names(scene.contacts)
+    having = {
         "bodies": [body.name for body in scene.bodies if not body.rigid or figure == "mass"],
         "probes": [probe.name for probe in scene.probes if probe.cfc is not None or not filtered],
         "sections": [section.name for section in scene.sections],
-        "contacts_by_pair": contact_names(scene.contacts),
+        "contacts_by_pair": names,
+        "joints": [joint.name for joint in scene.joints if joint.whole() is not None],
         "springs": [load.name for load in scene.loads if isinstance(load, Spring)],
+        "bonds": [name for name, own in zip(names, scene.contacts, strict=True) if getattr(own, "bond", None)],
+        "failure": scene.failing,
+        "energy": ENERGIES,
     }
-    return [name for key, own in names.items() if figure in FIGURES[key] for name in own]
+    return [name for key, own in having.items() if figure in FIGURES[key] for name in own]

@@ -24,6 +24,7 @@ from warp_mca.scene.options import with_options
 from warp_mca.studies.sweep_columns import parameter_column
 from warp_mca.studies.sweep_job import Job, Row, failure, run_job
 from warp_mca.studies.sweep_plan import Plan, RunOptions, batches, differing
+from warp_mca.studies.sweep_report import write_report
 from warp_mca.studies.sweep_table import IDENTITY, SweepTable, check_identity, remove_sweep, write_identity
 from warp_mca.studies.sweep_workers import (
     Prepare,
@@ -119,8 +120,7 @@ def carry_out(
         executor, workers, force, progress: as in `sweep`.
         meshes: of the plan's model file.
         prepare: called by each worker process before its first run.
-        deadline: no run begins later than this after the call [s]; the rows of others say so, but
-            are not in the table.
+        deadline: no run begins later than this after the call [s]; the rows of others say so, but are not in the table.
 
     Raises:
         RequestError, McaError: as in `sweep`.
@@ -137,7 +137,8 @@ def carry_out(
             given = "process"  # that a run of it ends badly is then not the end of the sweep
         with opened_executor(given, plan.options.device, count, prepare) as (pool, limit):
             _Driver(plan, pool, limit or len(jobs), table, tell, end).go_through(jobs)
-    return _all_rows(plan, table)
+        write_report(plan, rows := _all_rows(plan, table))
+    return rows
 
 
 def stored_rows(plan: Plan) -> list[Row]:

@@ -186,6 +186,7 @@ def _outcome(result: Result) -> Row:
         "status": CRITERION if failed else DONE,
         "reason": one_line("; ".join(failed)) if failed else None,
         **dict(figures(rest)),
+        **dict(figures({str(k): item for k, item in enumerate(summary.get("criteria", ()))}, "criteria.")),
         "warnings": BETWEEN.join(map(one_line, result.warnings)) or None,
         "wall": wall,
     }

@@ -15,6 +15,7 @@ from warp_mca.base.errors import LONGEST, McaError, bad_value
 from warp_mca.base.files import write_atomically
 from warp_mca.base.log import warn
 from warp_mca.base.validate import MAX_COUNT
+from warp_mca.results.report import REPORT
 from warp_mca.results.storage import ALL_FILES
 from warp_mca.studies.sweep_columns import stored_row
 from warp_mca.studies.sweep_job import FAILED, Row
@@ -165,7 +166,7 @@ def remove_sweep(folder: Path) -> None:
                 (run / name).unlink(missing_ok=True)
             with suppress(OSError):  # it is not there, or other files are in it
                 run.rmdir()
-        for name in (PARQUET, CSV, IDENTITY):
+        for name in (REPORT, PARQUET, CSV, IDENTITY):
             (folder / name).unlink(missing_ok=True)
 
 
