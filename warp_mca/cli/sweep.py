@@ -113,6 +113,11 @@ def sweep(
     _print(plan, rows)
     if worst:
         _print_worst(rows)
+    _check_done(rows)
+
+
+def _check_done(rows: Sequence[Row]) -> None:
+    """Raise GuardError or CriterionError where not all runs are done, or meet their criteria."""
     count = {status: sum(row["status"] == status for row in rows) for status in ("stopped", "failed", "criterion")}
     if count["stopped"] or count["failed"]:
         said = [f"guards stopped {count['stopped']}"] if count["stopped"] else []

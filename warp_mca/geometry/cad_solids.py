@@ -71,7 +71,8 @@ def solid_names(model: Any) -> dict[int, str]:
     """A name for each solid of gmsh's model, by its tag."""
     found: dict[int, str] = {}
     for number, (_, tag) in enumerate(model.getEntities(3), start=1):
-        words = [word.strip() for word in model.getEntityName(3, tag).split("/")[1:]]
+        # gmsh gives the labels of all assemblies around a solid, and joins further labels of one by " & "
+        words = [word.partition(" & ")[0].strip() for word in model.getEntityName(3, tag).split("/")[1:]]
         named = [word for word in words if not (word in ("", *GENERIC_NAMES) or word.isdigit())]
         named = [word for word in named if not word.startswith("Open CASCADE")]
         name = named[-1] if named else f"solid_{number}"

@@ -18,7 +18,7 @@ from warp_mca.geometry.cad_drawing import diagonal
 
 LEAST_ACROSS, MOST_ACROSS = 0.25, 64.0  # cells over a wall that may be asked for [-]
 GREATEST = 6.0  # cells along the diagonal of a part, for each one over a wall, at least [-]
-ROUND = 4.0  # cells around a full circle, for each one over a wall [-]
+ROUND, FEWEST = 5.0, 8.0  # cells around a full circle, for each one over a wall and at least [-]
 SMALLEST = 0.5  # of the size in the thinnest wall: curvature makes no smaller cells [-]
 _SHARE = 0.2  # of a face's area that may be thinner than its thickness [-]
 _RAYS, _LEAST, _MOST = 3000, 3, 40  # of a part, of a face at least and at most
@@ -46,7 +46,7 @@ def set_sizes(gmsh: Any, across: float, *, drawn: bool) -> float:
     least = min(size.values(), default=greatest)
     gmsh.option.setNumber("Mesh.MeshSizeMax", greatest if drawn else least)
     gmsh.option.setNumber("Mesh.MeshSizeMin", SMALLEST * least if drawn else least)
-    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", ROUND * across if drawn else 0.0)
+    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", max(FEWEST, ROUND * across) if drawn else 0.0)
     if drawn:
         gmsh.model.mesh.clear()
         at: dict[int, float] = {}

@@ -189,7 +189,7 @@ class Assembly:
         ]
         sizes = [size for name in group if (size := self._size(name)) is not None]
         geometry = Cad(
-            self.path,
+            str(self.path),  # as model files store it
             size=min(sizes, default=None),
             scale=self.scale,
             across=self.across,

@@ -74,7 +74,7 @@ def drop_test(
         impact: phase of the impact; None runs for 20 passes of a wave in metal along the diagonal of the parts, with
             400 intervals.
         name: of the scene.
-        more: other fields of `Scene`, as `criteria` and `probes`.
+        more: other fields of `Scene`, as `criteria` and `probes`; places in space are those above the floor.
 
     Returns:
         The scene; its parameters are height, pose and onto.
@@ -85,39 +85,50 @@ def drop_test(
     if isinstance(parts, Assembly):
         parts, contacts = parts.bodies, (*parts.contacts, *contacts)
     bodies = (parts,) if isinstance(parts, Body) else tuple(parts)
-    validate.members("drop_test", Body, parts=bodies)
-    validate.members("drop_test", (Contact, ContactAll), contacts=contacts)
+    _check(bodies, contacts, onto, more)
     validate.positive("drop_test", height=height, gravity=gravity)
-    if not bodies:
-        raise bad_value("drop_test.parts", (), "give at least one body")
-    if onto not in FLOORS:
-        raise bad_value("drop_test.onto", validate.brief(onto), f"choose {', '.join(FLOORS)}")
-    for field in {"bodies", "parameters"} & set(more):
-        raise bad_value(f"drop_test.{field}", validate.brief(more[field]), "drop_test makes it; leave it out")
     extent = _extent(bodies)
     turn = pose_rotation(pose, extent)
     down: Vec3 = (0.0, 0.0, -gravity)
     placed = tuple(body.drop(height, down) for body in _placed(bodies, turn))
-    length = extent.diagonal
-    duration = _PASSES * length / _SPEED
-    floor = _floor(onto, length)
-    master = Surface(body="floor", nodes="zmax") if floor else RigidPlane(normal=(0.0, 0.0, 1.0))
-    skins = [Surface(body=body.name, nodes="boundary") for body in bodies if not body.is_inertia]
-    alone = [
-        replace(c, exclude=(*c.exclude, ("floor", "floor"))) if floor and isinstance(c, ContactAll) else c
-        for c in contacts
-    ]
+    duration = _PASSES * extent.diagonal / _SPEED
+    floor = _floor(onto, extent.diagonal)
     sides = tuple(Absorbing(body="floor", nodes=side, centre=(0.0, 0.0, 0.0)) for side in _OPEN) if floor else ()
     return Scene(
         name=name,
         bodies=placed + ((floor,) if floor else ()),
-        contacts=(*alone, *(Contact(slave=skin, master=master, mu=mu) for skin in skins)),
+        contacts=_contacts(contacts, bodies, floor, mu),
         absorbing=(*more.pop("absorbing", ()), *sides),
         gravity=down,
         impact=impact or ImpactPhase(duration=duration, output_interval=duration / _ROWS),
         parameters={"height": float(height), "pose": pose, "onto": onto},
         **more,
     )
+
+
+def _check(bodies: Sequence[Body], contacts: Sequence[object], onto: str, more: Mapping[str, object]) -> None:
+    """Raise RequestError for what no drop can be of."""
+    validate.members("drop_test", Body, parts=bodies)
+    validate.members("drop_test", (Contact, ContactAll), contacts=contacts)
+    if not bodies:
+        raise bad_value("drop_test.parts", (), "give at least one body")
+    if onto not in FLOORS:
+        raise bad_value("drop_test.onto", validate.brief(onto), f"choose {', '.join(FLOORS)}")
+    for field in {"bodies", "parameters"} & set(more):
+        raise bad_value(f"drop_test.{field}", validate.brief(more[field]), "drop_test makes it; leave it out")
+
+
+def _contacts(
+    contacts: Sequence[Contact | ContactAll], bodies: Sequence[Body], floor: Body | None, mu: float
+) -> tuple[Contact | ContactAll, ...]:
+    """The contacts of the bodies with each other, and of each with the floor, which has none with itself."""
+    master = Surface(body="floor", nodes="zmax") if floor else RigidPlane(normal=(0.0, 0.0, 1.0))
+    skins = [Surface(body=body.name, nodes="boundary") for body in bodies if not body.is_inertia]
+    among = [
+        replace(c, exclude=(*c.exclude, ("floor", "floor"))) if floor and isinstance(c, ContactAll) else c
+        for c in contacts
+    ]
+    return (*among, *(Contact(slave=skin, master=master, mu=mu) for skin in skins))
 
 
 _OPEN = ("xmin", "xmax", "ymin", "ymax", "zmin")  # sides of a real floor that let waves out
