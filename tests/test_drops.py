@@ -196,6 +196,15 @@ def test_commands_that_no_drop_can_follow_are_refused(
     assert not [path for path in folder.iterdir() if path.is_dir()]
 
 
+def test_words_of_a_file_are_no_code_of_its_script(folder: Path, capsys: pytest.CaptureFixture[str]):
+    """The command also runs the script."""
+    odd = (folder / "part.key").rename(folder / 'odd"""; x = 1\n.key')
+    assert main(["run", odd.name]) == 0
+    out = capsys.readouterr().out
+    assert out.startswith('"""odd___; x = 1_.key falls on a floor."""\n')
+    compile(out, "script", "exec")
+
+
 def test_the_script_of_an_assembly_lists_what_it_holds(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ):

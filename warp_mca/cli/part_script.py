@@ -97,13 +97,18 @@ def part_script(name: str) -> str:
         rows = [f"{key} ({x:.4g}, {y:.4g}, {z:.4g})" for key, (x, y, z) in centres.items()]
         title = "Node sets, with their centres [m]; mca.Surface, mca.Fixed and others name them, mca.Select makes more:"
         listing, parts = _listed(title, rows), _BODY.format(part=code, unit=unit)
-    return _SCRIPT.format(name=path.name, listing="\n".join(listing), parts=parts, more=more)
+    return _SCRIPT.format(name=_plain(path.name), listing="\n".join(listing), parts=parts, more=more)
 
 
 def _listed(title: str, rows: Sequence[str]) -> list[str]:
     """Lines of a comment."""
     left = [f"and {len(rows) - SHOWN} more"] if len(rows) > SHOWN else []
-    return [f"# {title}", *(f"#   {row}" for row in [*rows[:SHOWN], *left] or ["none"])]
+    return [f"# {title}", *(f"#   {_plain(row)}" for row in [*rows[:SHOWN], *left] or ["none"])]
+
+
+def _plain(text: str) -> str:
+    """The text of a file, which anybody may have written, so that it ends no line and no string of the script."""
+    return "".join(c if c.isprintable() and c not in '"\\' else "_" for c in text)
 
 
 def add_options(group: argparse._ArgumentGroup) -> None:

@@ -33,7 +33,7 @@ def run(args: argparse.Namespace) -> None:
     from warp_mca.results.criteria import unmet
     from warp_mca.results.storage import CONTACT_FILES, FILES, PATH_FILES, PROBE_FILES
 
-    every_pose = args.pose == part_script.EVERY
+    every_pose = args.pose == part_script.EVERY and part_script.is_part(args.scene)
     if every_pose:
         args.sweeps.append(f"pose={','.join(mca.POSES)}")
         args.pose = None

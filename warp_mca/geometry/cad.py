@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from warp_mca.base import validate
-from warp_mca.base.errors import bad_value
+from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.geometry.cad_cells import read_cells
 from warp_mca.geometry.cad_drawing import UNITS, diagonal, draw, explained, file_stamp, reading_time
 from warp_mca.geometry.cad_solids import chosen_solids, glued
@@ -155,13 +155,15 @@ def _meshed_by(cad: Cad, algorithms: dict[str, float]) -> Mesh:
             whole = dict(zip(names.values(), exact, strict=len(exact) > 0))
             names = glued(gmsh, names, cad.glue / scale)
             exact = divided(solid_volumes(gmsh, path), list(names.values()), whole)
-        allow(gmsh, _MESH + reading_time(path) + _ELEMENT * _sized(gmsh, cad, scale))
         try:
+            allow(gmsh, _MESH + reading_time(path) + _ELEMENT * _sized(gmsh, cad, scale))
             gmsh.model.mesh.generate(3)
             gmsh.option.setNumber("Mesh.SecondOrderLinear", float(Path(path).suffix.lower() == ".stl"))
             gmsh.model.mesh.setOrder(2)
+            if not all(len(gmsh.model.mesh.getElementTypes(*solid)) for solid in gmsh.model.getEntities(3)):
+                raise Exception("it leaves a solid without tetrahedra")  # as gmsh's own errors are
         except Exception as error:
-            if TOO_LONG in str(error):
+            if isinstance(error, RequestError) or TOO_LONG in str(error):
                 raise
             raise _MeshingError(str(error)) from error
         return read_cells(gmsh.model, scale, scale**3 * exact, names)
@@ -175,14 +177,14 @@ def _sized(gmsh: Any, cad: Cad, scale: float) -> float:
     """
     if cad.size is None:
         allow(gmsh, _MESH + reading_time(cad.path))
-        size, field = scale * set_sizes(gmsh, cad.across, drawn=Path(cad.path).suffix.lower() != ".stl"), "Cad.across"
+        size = scale * set_sizes(gmsh, cad.across, drawn=Path(cad.path).suffix.lower() != ".stl")
     else:
-        size, field = cad.size, "Cad.size"
+        size = cad.size
         for name in ("Mesh.MeshSizeMax", "Mesh.MeshSizeMin"):  # without a least size gmsh divides the part in ten
             gmsh.option.setNumber(name, size / scale)
     x0, y0, z0, x1, y1, z1 = gmsh.model.getBoundingBox(-1, -1)
     count = 6.0 * (x1 - x0) * (y1 - y0) * (z1 - z0) * (scale / size) ** 3
     if count > LIMIT and cad.size is not None:
         remedy = f"up to {count:.2g} elements would result in a part of {diagonal(gmsh) * scale:.3g} m"
-        raise bad_value(field, size, f"{remedy}; take a greater size, or check the scale")
+        raise bad_value("Cad.size", size, f"{remedy}; take a greater size, or check the scale")
     return min(count, LIMIT)

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.base.errors import RequestError
 from warp_mca.geometry.cad_drawing import entity_name
 from warp_mca.geometry.cell_types import GMSH_ORDER, TETRA10
 from warp_mca.geometry.degenerate import stored
@@ -23,20 +22,13 @@ def read_cells(model: Any, scale: float, exact: NDArray, names: Mapping[int, str
     """The mesh of gmsh's model, with sets of faces and of solids; nodes that no tetrahedron uses are left out.
 
     Args:
-        model: gmsh's, meshed by tetrahedra of ten nodes.
+        model: gmsh's, whose solids are meshed by tetrahedra of ten nodes.
         scale: metres for one unit of it.
         exact: volumes of its solids [m^3], shape (solid_count,) or (0,).
         names: of solids by tag; others have the name in the file, or "solid_1", ....
-
-    Raises:
-        RequestError: a solid has no tetrahedra.
     """
     solids = [tag for _, tag in model.getEntities(3)]
     blocks = [model.mesh.getElementsByType(TETRA10.gmsh, tag)[1].reshape(-1, TETRA10.corners) for tag in solids]
-    if not all(map(len, blocks)):
-        raise RequestError(
-            "gmsh left a solid without tetrahedra: repair the part in the CAD program or take another size"
-        )
     tags, coordinates, _ = model.mesh.getNodes()
     order = np.argsort(tags)
     tags, points = tags[order], scale * coordinates.reshape(-1, 3)[order]
