@@ -8,7 +8,7 @@ from fnmatch import fnmatchcase
 from functools import cached_property
 from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any
 
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
@@ -20,7 +20,7 @@ from warp_mca.scene.materials import Material
 if TYPE_CHECKING:
     from warp_mca.geometry.cad_solids import Solid, Touch
 
-Join = Literal["glue", "tie", "contact", "apart"] | Bond
+Join = str | Bond  # one of JOINS, or a bond that fails
 JOINS = ("glue", "tie", "contact", "apart")
 _HEALED = 2.0  # of the greatest gap or overlap of solids that are glued: faces as near count as one [-]
 _THIN = 0.05  # of the thinnest wall of these solids: no faces farther apart do [-]
@@ -57,7 +57,7 @@ class Assembly:
     materials: Mapping[str, Material]
     size: float | Mapping[str, float] | None = None
     across: float = 2.0
-    join: Mapping[str | tuple[str, str], Join] = field(default_factory=dict)
+    join: Mapping[Any, Join] = field(default_factory=dict)
     scale: float | None = None
     mu: float = 0.0
 
