@@ -12,6 +12,7 @@ from statics import Static
 
 import warp_mca as mca
 from warp_mca.geometry import cad
+from warp_mca.geometry.cad_solids import solid_names
 from warp_mca.geometry.quality import check, volumes
 from warp_mca.geometry.shape_volume import of_cells
 
@@ -62,6 +63,30 @@ def test_each_solid_and_each_instance_is_a_body_of_its_own_mass(phone: Path):
     assert moved == pytest.approx((5e-3, 0.0, 0.0), abs=1e-8)
     (general,) = assembly.contacts
     assert isinstance(general, mca.ContactAll) and general.exclude == ()
+
+
+class Labels:
+    """gmsh's model of solids with these labels."""
+
+    def __init__(self, *labels: str) -> None:
+        self.labels = labels
+
+    def getEntities(self, dim: int) -> list[tuple[int, int]]:
+        return [(dim, tag) for tag in range(len(self.labels))]
+
+    def getEntityName(self, dim: int, tag: int) -> str:
+        return self.labels[tag]
+
+
+def test_names_are_the_innermost_labels_that_say_something():
+    labels = (
+        "Shapes/as1/rod_1/nut & & 256",
+        "Shapes/as1/rod_2/nut",
+        "",
+        "Shapes/as1/lid/SOLID",
+        "Shapes/as1/3/COMPOUND",
+    )
+    assert list(solid_names(Labels(*labels)).values()) == ["nut", "nut_2", "solid_3", "lid", "as1"]
 
 
 def test_gaps_and_overlaps_of_the_file_are_told_with_place_and_depth(phone: Path):
