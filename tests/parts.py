@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 VOLUME = 24.0e-6  # of the bracket [m^3]: 40 x 20 x 20 mm^3 and 20 x 20 x 20 mm^3 on top of its end at x = 0
@@ -49,3 +50,56 @@ def write_parts(folder: Path) -> None:
         gmsh.write(str(folder / "ball.stl"))
     finally:
         gmsh.finalize()
+
+
+PHONE = {"shell": 496.0, "board": 192.0, "chip": 16.0, "chip_2": 16.0, "battery": 84.0, "glass": 240.0}  # mm^3
+OVERLAP, GAP = 10e-6, 2e-6  # of the battery with the shell, of the glass from it [m]
+
+
+def write_phone(folder: Path) -> Path:
+    """Write phone.step, in millimetres: six solids, of which two are instances of the part "chip"."""
+    import gmsh
+
+    file = folder / "phone.step"
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        shapes = gmsh.model.occ
+        shapes.cut([(3, shapes.addBox(0, 0, 0, 24, 10, 5))], [(3, shapes.addBox(1, 1, 1, 22, 8, 4))])
+        shapes.addBox(1.5, 1, 1, 12, 8, 2)
+        shapes.addBox(3, 3, 3, 4, 4, 1)
+        shapes.addBox(15, 1.5, 0.99, 6, 7, 2)
+        shapes.addBox(0, 0, 5.002, 24, 10, 1)
+        shapes.synchronize()
+        gmsh.write(str(file))
+    finally:
+        gmsh.finalize()
+    text = file.read_text()
+    for number, name in enumerate(("shell", "board", "chip", "battery", "glass"), start=1):
+        text = re.sub(rf"Open CASCADE STEP translator [\d.]+ \d+\.{number}'", f"{name}'", text)
+    file.write_text(with_instance(text, 3, (5.0, 0.0, 0.0)))
+    return file
+
+
+def with_instance(text: str, number: int, shift: tuple[float, float, float]) -> str:
+    """The text of a STEP file that gmsh wrote, with a part of its assembly a second time, moved [mm]."""
+    last = max(map(int, re.findall(r"^#(\d+) =", text, flags=re.M)))
+    root, part = re.findall(r"NEXT_ASSEMBLY_USAGE_OCCURRENCE\('\d+','','',(#\d+),(#\d+),", text)[number - 1]
+    (shape,) = re.findall(rf"(#\d+) = PRODUCT_DEFINITION_SHAPE\('','',{part}\)", text)
+    (own,) = re.findall(rf"SHAPE_DEFINITION_REPRESENTATION\({shape},(#\d+)\)", text)
+    (whole,) = re.findall(rf"REPRESENTATION_RELATIONSHIP\('','',{own},(#\d+)\)", text)
+    ((first, z, x),) = re.findall(r"(#\d+) = AXIS2_PLACEMENT_3D\('',#12,(#\d+),(#\d+)\)", text)
+    kind = "REPRESENTATION_RELATIONSHIP"
+    relation = f"{kind}('','',{own},{whole})"
+    lines = (
+        f"CARTESIAN_POINT('',({shift[0]},{shift[1]},{shift[2]}))",
+        f"AXIS2_PLACEMENT_3D('',#{last + 1},{z},{x})",
+        f"ITEM_DEFINED_TRANSFORMATION('','',{first},#{last + 2})",
+        f"({relation} {kind}_WITH_TRANSFORMATION(#{last + 3}) SHAPE_{kind}())",
+        f"NEXT_ASSEMBLY_USAGE_OCCURRENCE('99','','',{root},{part},$)",
+        f"PRODUCT_DEFINITION_SHAPE('','',#{last + 5})",
+        f"CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#{last + 4},#{last + 6})",
+    )
+    more = "".join(f"#{last + k} = {line};\n" for k, line in enumerate(lines, start=1))
+    head, end, tail = text.rpartition("ENDSEC;")
+    return re.sub(rf"({whole} = SHAPE_REPRESENTATION\('',\({first})", rf"\1,#{last + 2}", head) + more + end + tail

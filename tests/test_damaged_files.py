@@ -14,7 +14,7 @@ import pytest
 from parts import write_parts
 
 import warp_mca as mca
-from warp_mca.geometry import cad
+from warp_mca.geometry import cad, cad_drawing
 from warp_mca.geometry.gmsh_session import LIMIT, gmsh_session
 from warp_mca.geometry.quality import check
 
@@ -127,7 +127,7 @@ def test_large_files_and_many_elements_may_take_longer(tmp_path: Path, monkeypat
     allowed = []
     monkeypatch.setattr(cad, "allow", lambda gmsh, seconds: allowed.append(seconds))
     mca.Cad(tmp_path / "part.brep", size=0.01, scale=1e-3).build()
-    monkeypatch.setattr(cad, "_BYTE", 1.0)
+    monkeypatch.setattr(cad_drawing, "_BYTE", 1.0)
     monkeypatch.setattr(cad, "_ELEMENT", 1.0)
     mca.Cad(tmp_path / "part.brep", size=0.011, scale=1e-3).build()
     count = 6.0 * 0.04 * 0.02 * 0.04 / 0.011**3  # of a part that fills its box

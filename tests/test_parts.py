@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from parts import CAD, LENGTH, MESHES, VOLUME, write_parts
+from parts import CAD, LENGTH, MESHES, VOLUME, write_parts, write_phone
 from recipes import area
 
 import warp_mca as mca
@@ -317,6 +317,7 @@ def test_the_page_of_parts_runs(
     monkeypatch.chdir(tmp_path)
     for name, source in (("bracket.step", "part.step"), ("bracket.key", "part.key")):
         Path(name).write_bytes((folder / source).read_bytes())
+    write_phone(tmp_path)
     names: dict = {}
     for number, example in enumerate(EXAMPLES):
         exec(compile(example, f"docs/parts.md, example {number + 1}", "exec"), names)

@@ -83,10 +83,13 @@ if TYPE_CHECKING:
     from warp_mca.results.result import Result
     from warp_mca.results.storage import load
     from warp_mca.robots.robot import Robot
+    from warp_mca.scene.cad_assembly import Assembly
     from warp_mca.scene.catalogue import make_scene
+    from warp_mca.scene.drops import POSES, drop_test
     from warp_mca.scene.parameters import Param
     from warp_mca.studies.batch import run_batch
     from warp_mca.studies.sweep import sweep
+    from warp_mca.studies.worst import worst
 
 _LAZY = {
     "Box": "warp_mca.geometry",
@@ -102,6 +105,9 @@ _LAZY = {
     "Select": "warp_mca.geometry",
     "Sphere": "warp_mca.geometry",
     "Robot": "warp_mca.robots.robot",
+    "Assembly": "warp_mca.scene.cad_assembly",
+    "POSES": "warp_mca.scene.drops",
+    "drop_test": "warp_mca.scene.drops",
     "Param": "warp_mca.scene.parameters",
     "Accuracy": "warp_mca.accuracy.request",
     "make_scene": "warp_mca.scene.catalogue",
@@ -115,6 +121,7 @@ _LAZY = {
     "run": "warp_mca.accuracy.simulation",
     "run_batch": "warp_mca.studies.batch",
     "sweep": "warp_mca.studies.sweep",
+    "worst": "warp_mca.studies.worst",
 }
 
 __all__ = [
@@ -188,6 +195,9 @@ __all__ = [
     "Plate",
     "MeshFile",
     "Cad",
+    "Assembly",
+    "drop_test",
+    "POSES",
     "Select",
     "NestedPlate",
     "Part",
@@ -203,6 +213,7 @@ __all__ = [
     "run",
     "run_batch",
     "sweep",
+    "worst",
     "tradeoff",
     "load",
     "Result",

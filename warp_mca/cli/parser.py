@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import warp_mca as mca
-from warp_mca.cli import commands, paper, recorders, resume, run, sweep, tradeoff
+from warp_mca.cli import commands, paper, part_script, recorders, resume, run, sweep, tradeoff
 from warp_mca.cli.accuracy import add_accuracy
 from warp_mca.cli.folder import folder
 from warp_mca.phases.every import METHODS
@@ -79,6 +79,7 @@ def _run(parser: argparse.ArgumentParser) -> None:
     _add_scene(parser, "; of a part or mesh (.step, .msh, …) a scene file is printed that drops it")
     _add_device(parser)
     _add_options(parser)
+    part_script.add_options(_group(parser, "drop of a part", "part.step --height 1.2 --onto concrete --pose corner"))
     add_accuracy(_group(parser, "accuracy", "two_link --set joint_nodes=pin --accuracy 2%"))
     _add_results(parser)
 

@@ -1,10 +1,12 @@
-"""Owns the answer to `warp-mca run part.step`: a scene file that drops the part on a floor, to start from."""
+"""Owns parts as scenes: `warp-mca run part.step` prints a scene file that drops it, or runs that with `--height`."""
 
 from __future__ import annotations
 
+import argparse
 import json
 import math
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,33 +14,38 @@ import numpy as np
 from warp_mca.base.errors import RequestError, bad_value
 
 MESH_SUFFIXES = (".msh", ".unv", ".bdf", ".nas", ".fem", ".inp", ".k", ".key", ".dyn", ".vtu", ".vtk", ".med")
-CELLS = 8  # ten-node tetrahedra along the diagonal of a CAD part
-SPEED = 5000.0  # of waves in metals [m/s]
-PASSES = 20  # of a wave along the part in the simulated time
-ROWS = 400  # of the history
-SHOWN = 12  # node sets that the script lists
+SHOWN = 12  # node sets, solids and pairs of them that the script lists
+OPTIONS = ("height", "pose", "onto")  # of the command line, which are parameters of the script
+EVERY = "all"  # value of --pose for a sweep over all poses
 
-_SCRIPT = '''"""{name} falls on a rigid floor."""
+_SCRIPT = '''"""{name} falls on a floor."""
+
+from typing import Annotated
 
 import warp_mca as mca
 
-# Node sets, with their centres [m]; mca.Surface, mca.Fixed and others name them, mca.Select makes more:
-{sets}
+{listing}
 
 
-def build(*, height: float = 0.5, mu: float = 0.2) -> mca.Scene:
+def build(
+    *,
+    height: Annotated[float, mca.Param("of the fall", "m", low=0.0, exclusive=True)] = 0.5,
+    pose: Annotated[str, mca.Param("face, edge, corner, one of mca.POSES, or degrees about x, y: 30/45")] = "face",
+    onto: Annotated[str, mca.Param("floor", choices=("rigid", "steel", "concrete", "wood"))] = "rigid",
+    mu: Annotated[float, mca.Param("coefficient of friction", "-", low=0.0)] = 0.2,
+    material: Annotated[str, mca.Param("of mca.library", choices=("steel", *mca.library.materials()))] = "steel",
+{more}) -> mca.Scene:
     steel = mca.J2Bilinear(E=210e9, nu=0.3, rho=7850.0, sigma_y=250e6, E_t=1e9)
-    part = {part}  # {unit}
-    floor, gravity = mca.RigidPlane(normal=(0.0, 0.0, 1.0)), (0.0, 0.0, -9.81)
-    body = mca.Body(name="part", geometry=part, material=steel).place_on(floor, gap=1e-6).drop(height, gravity)
-    return mca.Scene(
-        name="drop",
-        bodies=(body,),
-        contacts=(mca.Contact(slave=mca.Surface(body="part", nodes="boundary"), master=floor, mu=mu),),
-        gravity=gravity,
-        impact=mca.ImpactPhase(duration={duration:.2g}, output_interval={interval:.2g}),
-    )
+    chosen = {{"steel": steel, **mca.library.materials()}}[material]
+{parts}
+    return mca.drop_test(parts, height=height, pose=pose, onto=onto, mu=mu)
 '''
+_ACROSS = '    across: Annotated[float, mca.Param("elements over a wall", "-", low=0.25, high=64.0)] = 1.0,\n'
+_BODY = """    part = {part}  # {unit}
+    kinematics = "finite" if chosen.finite_only else "corotational"
+    parts = mca.Body(name="part", geometry=part, material=chosen, kinematics=kinematics)"""
+_ASSEMBLY = """    # in {unit}; materials={{"NAME": ..., "*": ...}} by solid, join={{("NAME", "NAME"): "glue"}} by pair
+    parts = mca.Assembly({path}, across=across, scale={scale:g}, materials={{"*": chosen}}, mu=mu)"""
 
 
 def is_part(name: str) -> bool:
@@ -49,39 +56,94 @@ def is_part(name: str) -> bool:
 
 
 def part_script(name: str) -> str:
-    """A scene file that drops the part in the file `name` on a floor; the part is meshed for its size and node sets.
+    """A scene file that drops the part in the file `name` on a floor; the file is read for its size and its names.
 
     Raises:
         RequestError: the file cannot be read.
     """
     from warp_mca.geometry.cad import UNITS, Cad, extent
+    from warp_mca.geometry.cad_drawing import file_stamp
+    from warp_mca.geometry.cad_solids import inspected
     from warp_mca.geometry.mesh_file import MeshFile
     from warp_mca.watch.units import LONGEST
 
     path = Path(name).resolve()
-    is_cad = path.suffix.lower() in UNITS
-    scale = UNITS.get(path.suffix.lower(), 1.0)
-    diagonal = extent(path) if is_cad else math.hypot(*np.ptp(MeshFile(path).build().points, axis=0))
-    if scale == 1.0 and diagonal > LONGEST:  # the file names no unit
-        scale, diagonal = 1e-3, 1e-3 * diagonal
-    if is_cad:
-        part = Cad(path, size=float(f"{diagonal / CELLS:.2g}"), scale=scale)
-        code = f"mca.Cad({json.dumps(str(path))}, size={part.size:g}, scale={scale:g})"
+    suffix = path.suffix.lower()
+    scale, solids, touching = UNITS.get(suffix, 1.0), [], []
+    if suffix not in UNITS:
+        diagonal = math.hypot(*np.ptp(MeshFile(path).build().points, axis=0))
+    elif suffix == ".stl":
+        diagonal = extent(path)
     else:
-        part, code = MeshFile(path, scale=scale), f"mca.MeshFile({json.dumps(str(path))}, scale={scale:g})"
-    mesh = part.build()
-    centres = {key: mesh.points[nodes].mean(axis=0) for key, nodes in mesh.node_sets.items() if len(nodes)}
-    rows = [f"#   {key} ({x:.4g}, {y:.4g}, {z:.4g})" for key, (x, y, z) in list(centres.items())[:SHOWN]]
-    rows += [f"#   and {len(centres) - SHOWN} more"] if len(centres) > SHOWN else []
-    duration = PASSES * diagonal / SPEED
-    return _SCRIPT.format(
-        name=path.name,
-        sets="\n".join(rows or ["#   none"]),
-        part=code,
-        unit="millimetres" if scale == 1e-3 else "metres",
-        duration=duration,
-        interval=float(f"{duration:.2g}") / ROWS,
+        solids, touching = inspected(path, scale, file_stamp(path))
+        low, high = np.min([solid.low for solid in solids], axis=0), np.max([solid.high for solid in solids], axis=0)
+        diagonal = math.dist(low, high)
+    if scale == 1.0 and diagonal > LONGEST:  # the file names no unit
+        scale = 1e-3
+        solids, touching = inspected(path, scale, file_stamp(path)) if solids else ([], [])
+    unit, shown, more = "millimetres" if scale == 1e-3 else "metres", json.dumps(str(path)), ""
+    if len(solids) > 1:
+        rows = [f"{solid.name} ({1e6 * solid.volume:.4g} cm^3)" for solid in solids]
+        listing = [*_listed("Solids, bodies of these names:", rows)]
+        listing += _listed("Those that touch, press on each other unless they are joined:", [t.text for t in touching])
+        parts, more = _ASSEMBLY.format(path=shown, scale=scale, unit=unit), _ACROSS
+    else:
+        if suffix in UNITS:
+            mesh, more = Cad(path, across=1.0, scale=scale).build(), _ACROSS
+            code = f"mca.Cad({shown}, across=across, scale={scale:g})"
+        else:
+            mesh, code = MeshFile(path, scale=scale).build(), f"mca.MeshFile({shown}, scale={scale:g})"
+        centres = {key: mesh.points[nodes].mean(axis=0) for key, nodes in mesh.node_sets.items() if len(nodes)}
+        rows = [f"{key} ({x:.4g}, {y:.4g}, {z:.4g})" for key, (x, y, z) in centres.items()]
+        title = "Node sets, with their centres [m]; mca.Surface, mca.Fixed and others name them, mca.Select makes more:"
+        listing, parts = _listed(title, rows), _BODY.format(part=code, unit=unit)
+    return _SCRIPT.format(name=_plain(path.name), listing="\n".join(listing), parts=parts, more=more)
+
+
+def _listed(title: str, rows: Sequence[str]) -> list[str]:
+    """Lines of a comment."""
+    left = [f"and {len(rows) - SHOWN} more"] if len(rows) > SHOWN else []
+    return [f"# {title}", *(f"#   {_plain(row)}" for row in [*rows[:SHOWN], *left] or ["none"])]
+
+
+def _plain(text: str) -> str:
+    """The text of a file, which anybody may have written, so that it ends no line and no string of the script."""
+    return "".join(c if c.isprintable() and c not in '"\\' else "_" for c in text)
+
+
+def add_options(group: argparse._ArgumentGroup) -> None:
+    """Those of a drop."""
+    group.add_argument("--height", type=float, metavar="METRES", help="run the drop of a part from this height")
+    group.add_argument(
+        "--onto", metavar="FLOOR", help="run it onto a floor: rigid, steel, concrete or wood (default: rigid)"
     )
+    group.add_argument(
+        "--pose",
+        help="run it with this side down: face, edge, corner, one as xmin-zmax, degrees about x and y as 30/45; all: a "
+        "sweep over faces, edges and corners of the box around it, 26 (default: face)",
+    )
+
+
+def is_drop(args: argparse.Namespace) -> bool:
+    """Whether the options of a drop are given."""
+    return any(getattr(args, name, None) is not None for name in OPTIONS)
+
+
+def check_drop(args: argparse.Namespace) -> None:
+    """Refuse options with which no drop of a part is run.
+
+    Raises:
+        RequestError: there is one.
+    """
+    if not is_part(args.scene):
+        name = next(name for name in OPTIONS if getattr(args, name, None) is not None)
+        remedy = f"it is for parts (.step, .msh, ...); --set changes what {args.scene} has as a parameter"
+        raise bad_value(f"--{name}", getattr(args, name), remedy)
+    kept = f"print a scene with 'warp-mca run {args.scene} > drop.py', then run that"
+    if args.method != "mca":
+        raise bad_value("--method", args.method, f"a drop starts at the impact; {kept}")
+    if args.checkpoint is not None:
+        raise bad_value("--checkpoint", args.checkpoint, f"a run goes on from a scene file; {kept}")
 
 
 def print_script(name: str) -> None:

@@ -49,10 +49,16 @@ def read_requests(args: argparse.Namespace, settings: Sequence[Mapping[str, str]
     """Build the scenes that the arguments ask for, each with some parameters changed; their file is read once."""
     if robot_script.is_robot(args.scene):
         raise robot_script.no_scene(args.scene)
-    if part_script.is_part(args.scene):
+    drop = part_script.is_drop(args)
+    if drop:
+        part_script.check_drop(args)
+    elif part_script.is_part(args.scene):
         raise part_script.no_scene(args.scene)
     for name in args.imports:
         import_named("--import", name)
+    if drop:
+        source = catalogue.source_of_text(part_script.part_script(args.scene), f"{Path(args.scene).stem}-drop")
+        return [_of_source(args, source, more) for more in settings]
     if Path(args.scene).suffix != SUFFIX:
         source = catalogue.load_source(args.scene)
         return [_of_source(args, source, more) for more in settings]
@@ -90,6 +96,11 @@ def _overrides(args: argparse.Namespace, more: Mapping[str, str]) -> dict[str, o
         RequestError: an option says the same of all scenes, and would win without a word.
     """
     overrides: dict[str, object] = {**catalogue.parse_overrides(args.settings), **more}
+    for name in part_script.OPTIONS:
+        if (value := getattr(args, name, None)) is not None:
+            if name in overrides:
+                raise bad_value(f"--{name}", value, f"it is given as {name}={overrides[name]}, too; leave one out")
+            overrides[name] = value
     for name in OPTIONS:
         if (value := getattr(args, name, None)) is not None and name in overrides:
             remedy = f"{name} is given as a parameter as well, {overrides[name]}; leave one of the two out"

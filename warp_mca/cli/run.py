@@ -31,13 +31,18 @@ def run(args: argparse.Namespace) -> None:
     from warp_mca.base.progress import progress_bar
     from warp_mca.results.criteria import unmet
 
+    every_pose = args.pose == part_script.EVERY and part_script.is_part(args.scene)
+    if every_pose:
+        args.sweeps.append(f"pose={','.join(mca.POSES)}")
+        args.pose = None
+        args.height = 0.5 if args.height is None else args.height
     if args.sweeps:
-        _sweep(args)
+        _sweep(args, every_pose)
         return
     if robot_script.is_robot(args.scene):
         robot_script.print_script(args.scene)
         return
-    if part_script.is_part(args.scene):
+    if part_script.is_part(args.scene) and not part_script.is_drop(args):
         part_script.print_script(args.scene)
         return
     if not args.quiet:
@@ -115,7 +120,7 @@ def _noting_what_is_left(args: argparse.Namespace) -> Iterator[None]:
         raise
 
 
-def _sweep(args: argparse.Namespace) -> None:
+def _sweep(args: argparse.Namespace, worst: bool) -> None:
     """Carry out `--sweep`: as the command `sweep`, with the files of each run kept."""
     if args.accuracy is not None:
         raise bad_value("--accuracy", args.accuracy, "each scene of a sweep would get a model of its own; leave it out")
@@ -125,4 +130,4 @@ def _sweep(args: argparse.Namespace) -> None:
         raise bad_value("--sweep", args.sweeps[0], "its runs take no --method and no --checkpoint; leave these out")
     if args.quiet or args.json:
         raise bad_value("--sweep", args.sweeps[0], "--quiet and --json are for single runs; leave these out")
-    sweep.sweep(args, "--sweep", args.sweeps, folders=True)
+    sweep.sweep(args, "--sweep", args.sweeps, folders=True, worst=worst)

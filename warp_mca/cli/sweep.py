@@ -68,6 +68,7 @@ def sweep(
     executor: str | None = None,
     workers: int | None = None,
     batch: int | None = None,
+    worst: bool = False,
 ) -> None:
     """Carry out a sweep, and print its table.
 
@@ -76,6 +77,7 @@ def sweep(
         option: of the command line that has the grid.
         grids: its texts `KEY=VALUE,VALUE,…`.
         folders, executor, workers, batch: as in `warp_mca.sweep`.
+        worst: whether a table names the run with the greatest of each figure.
 
     Raises:
         RequestError: the request cannot be carried out.
@@ -109,6 +111,13 @@ def sweep(
             progress=progress,
         )
     _print(plan, rows)
+    if worst:
+        _print_worst(rows)
+    _check_done(rows)
+
+
+def _check_done(rows: Sequence[Row]) -> None:
+    """Raise GuardError or CriterionError where not all runs are done, or meet their criteria."""
     count = {status: sum(row["status"] == status for row in rows) for status in ("stopped", "failed", "criterion")}
     if count["stopped"] or count["failed"]:
         said = [f"guards stopped {count['stopped']}"] if count["stopped"] else []
@@ -160,3 +169,19 @@ def _print(plan: Plan, rows: Sequence[Row]) -> None:
     for name in (CSV, PARQUET, REPORT):
         if plan.out and (plan.out / name).exists():
             out.print(f"wrote {plan.out / name}", soft_wrap=True)
+
+
+def _print_worst(rows: Sequence[Row]) -> None:
+    """A line for each figure: the greatest of all runs, and which run has it."""
+    from rich.table import Table
+
+    from warp_mca.base.console import console
+    from warp_mca.studies.worst import worst
+
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for heading in ("worst", "value", "unit", "run", "with"):
+        table.add_column(heading, justify="right" if heading in ("value", "run") else "left")
+    for entry in worst(rows):
+        chosen = ", ".join(f"{key}={value}" for key, value in entry["parameters"].items())
+        table.add_row(entry["figure"], f"{entry['value']:.5g}", entry["unit"], str(entry["index"]), chosen)
+    console().print(table)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,14 @@ def solid_volumes(gmsh: Any, path: str) -> Array:
     order = np.argsort(tags)
     volume = enclosed_volume(coordinates.reshape(-1, 3)[order], np.searchsorted(tags[order], triangles))
     return np.zeros(0) if volume is None else np.array([volume])
+
+
+def divided(pieces: Array, names: Sequence[str], whole: Mapping[str, float]) -> Array:
+    """Volumes of pieces of solids, scaled to those of the whole solids by name; empty if these are not known."""
+    if not whole or not len(pieces):
+        return np.zeros(0)
+    total = {name: float(pieces[[own == name for own in names]].sum()) for name in names}
+    return np.array([piece * whole[name] / total[name] for piece, name in zip(pieces, names, strict=True)])
 
 
 def enclosed_volume(points: Array, triangles: NDArray[np.integer]) -> float | None:

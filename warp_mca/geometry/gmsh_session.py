@@ -27,6 +27,7 @@ from warp_mca.base.errors import RequestError, bad_value
 LIMIT = "WARP_MCA_MESH_TIME"  # environment variable: longest time for reading a file, and for meshing it [s]
 DEFAULT_LIMIT = 600.0  # for a file whose size the caller does not tell [s]
 DYING = 5.0  # time that a process which answers no more takes to end, at most [s]
+TOO_LONG = "it took more than"  # so begins what is said of a process that was ended for its time
 _LIBRARIES = "libglu1-mesa libgl1 libxft2 libxcursor1 libxinerama1 libgomp1"
 _OPTIONS = {"General.Terminal": 0.0, "General.NumThreads": 1.0, "Mesh.ElementOrder": 1.0}
 _START = {"readConfigFiles": False, "interruptible": False}  # signal handlers need the main thread
@@ -95,7 +96,7 @@ class _Process:
                 good, answer = pickle.load(self.process.stdout)
             except TimeoutError:
                 longer = f"the environment variable {LIMIT}={10.0 * self.limit:.2g} allows ten times as many"
-                self.broken = f"it took more than {self.limit:.2g} s, as damaged files may make it; {longer}"
+                self.broken = f"{TOO_LONG} {self.limit:.2g} s, as damaged files may make it; {longer}"
             except (EOFError, pickle.UnpicklingError):
                 self.broken = f"it crashed, as damaged files may make it: {self._how_it_ended()}"
             else:

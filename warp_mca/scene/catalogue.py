@@ -129,6 +129,13 @@ def load_source(name: str | os.PathLike[str]) -> SceneSource:
     return _source(import_module(f"warp_mca.scenes.{name}"), name, builtin=True)
 
 
+def source_of_text(text: str, name: str) -> SceneSource:
+    """The scene in the text of a scene file that the package has written."""
+    module = ModuleType(f"warp_mca_scene_text_{name}")
+    exec(compile(text, f"<{name}>", "exec"), vars(module))
+    return _source(module, name, builtin=False)
+
+
 def make_scene(name: str | os.PathLike[str], *, preset: str | None = None, **parameters: object) -> Scene:
     """Build a built-in scene, or the one in a Python file, e.g. `make_scene("two_link", preset="quick", mu=0.3)`.
 

@@ -68,6 +68,9 @@ EPDM_60 = NeoHookean(C10=0.6e6, rho=1150.0)
 EPP_30 = CrushableFoam(
     E=4e6, rho=30.0, crush=(0.0, 0.25, 0.5, 0.75), stress=(0.09e6, 0.15e6, 0.21e6, 0.47e6), tension=0.4e6
 )
+STRUCTURAL_STEEL = Elastic(E=210e9, nu=0.3, rho=7850.0)
+CONCRETE_C30 = Elastic(E=33e9, nu=0.2, rho=2400.0)
+RED_OAK = Elastic(E=2.1e9, nu=0.35, rho=700.0)
 NATURAL_RUBBER = Ogden(mu=(0.63e6, 0.0012e6, -0.01e6), alpha=(1.3, 5.0, -2.0), rho=930.0)
 
 _GRADES = (
@@ -98,6 +101,12 @@ SOURCES: dict[str, str] = {
     "times the length",
     "EPP_30": "typical of expanded polypropylene of 30 kg/m^3 at 25, 50 and 75 %, of no one data sheet: take that of "
     "the grade; slow; stronger at higher rates",
+    "STRUCTURAL_STEEL": "EN 1993-1-1, 3.2.6: it does not yield; for floors and fixtures",
+    "CONCRETE_C30": "EN 1992-1-1, table 3.1, secant modulus of C30/37, and 3.1.3: it does not crack; density of plain "
+    "concrete after EN 1991-1-1; for floors",
+    "RED_OAK": "Wood Handbook (USDA FPL-GTR-282, 2021), tables 5-1 and 5-3a: northern red oak at 12 % of moisture, "
+    "radial modulus, 0.154 of the longitudinal one; as an isotropic stand-in that does not dent, for floors that are "
+    "loaded across the grain",
     "STEEL_A36": "Schwer, 6th European LS-DYNA Users' Conference (2007), after Seidt and others: to 2000 1/s",
 }
 

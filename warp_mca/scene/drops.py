@@ -1,0 +1,274 @@
+"""Owns drop tests: parts turned into a pose, just above a floor, with the speed of their fall."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warp_mca.base import validate
+from warp_mca.base.arrays import Array
+from warp_mca.base.errors import bad_value
+from warp_mca.base.rotation import rotation_matrix
+from warp_mca.scene import library
+from warp_mca.scene.absorbing import Absorbing
+from warp_mca.scene.bodies import Body, Vec3
+from warp_mca.scene.cad_assembly import Assembly
+from warp_mca.scene.contacts import Contact, ContactAll, RigidPlane, Surface
+from warp_mca.scene.elastic import Elastic
+from warp_mca.scene.phases import ImpactPhase
+from warp_mca.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from warp_mca.geometry.mesh import Mesh
+
+_SIDES = [signs for signs in product((-1, 0, 1), repeat=3) if any(signs)]
+POSES = tuple(
+    "-".join(f"{axis}{'max' if sign > 0 else 'min'}" for axis, sign in zip("xyz", signs, strict=True) if sign)
+    for signs in sorted(_SIDES, key=lambda signs: sum(map(abs, signs)))
+)  # what of the box around the parts meets the floor: 6 faces, 12 edges, 8 corners
+NAMED = {"face": "zmin", "edge": "xmin-zmin", "corner": "xmin-ymin-zmin"}
+FLOORS: dict[str, Elastic | None] = {
+    "rigid": None,
+    "steel": library.STRUCTURAL_STEEL,
+    "concrete": library.CONCRETE_C30,
+    "wood": library.RED_OAK,
+}
+GAP = 1e-6  # between the lowest node and the floor at the start [m]
+_SPEED, _PASSES, _ROWS = 5000.0, 20, 400  # of waves in metals [m/s], along the parts in a run, intervals of output
+_WIDTH, _DEPTH, _CELLS = 1.25, 0.45, 20  # of a real floor over the diagonal of the parts [-], cells along its width
+_ANGLES = re.compile(r"([^/]+)/([^/]+)")
+
+
+def drop_test(
+    parts: Body | Sequence[Body] | Assembly,
+    *,
+    height: float,
+    pose: str = "face",
+    onto: str = "rigid",
+    mu: float = 0.2,
+    contacts: Sequence[Contact | ContactAll] = (),
+    gravity: float = 9.81,
+    impact: ImpactPhase | None = None,
+    name: str = "drop",
+    **more: Any,
+) -> Scene:
+    """A scene in which parts fall on the floor z = 0; it begins just before the impact, at sqrt(2 g h).
+
+    Args:
+        parts: a body, several, or an assembly with its contacts; they are meshed for their boxes and their mass.
+        height: of the fall from rest [m].
+        pose: what of the box around the parts meets the floor: one of `POSES`, as "zmin" for a face, "xmax-zmin" for an
+            edge, "xmin-ymax-zmin" for a corner; or "face", "edge" or "corner" for the one at least x, y and z. The
+            centre of mass is above an edge or a corner. "A/B": turned by A about x, then by B about y [degrees].
+        onto: "rigid", or a floor of "steel", "concrete" or "wood" (`mca.library` has their source): an elastic block
+            whose other sides let waves out, with 20 cells over 1.25 times the diagonal of the parts.
+        mu: coefficient of friction on the floor [-].
+        contacts: of the bodies with each other.
+        gravity: g [m/s^2].
+        impact: phase of the impact; None runs for 20 passes of a wave in metal along the diagonal of the parts, with
+            400 intervals.
+        name: of the scene.
+        more: other fields of `Scene`, as `criteria` and `probes`; places in space are those above the floor.
+
+    Returns:
+        The scene; its parameters are height, pose and onto.
+
+    Raises:
+        RequestError: pose or floor are unknown, height or gravity no positive number, or a part cannot be meshed.
+    """
+    if isinstance(parts, Assembly):
+        parts, contacts = parts.bodies, (*parts.contacts, *contacts)
+    bodies = (parts,) if isinstance(parts, Body) else tuple(parts)
+    _check(bodies, contacts, onto, more)
+    validate.positive("drop_test", height=height, gravity=gravity)
+    extent = _extent(bodies)
+    turn = pose_rotation(pose, extent)
+    down: Vec3 = (0.0, 0.0, -gravity)
+    placed = tuple(body.drop(height, down) for body in _placed(bodies, turn))
+    duration = _PASSES * extent.diagonal / _SPEED
+    floor = _floor(onto, extent.diagonal)
+    sides = tuple(Absorbing(body="floor", nodes=side, centre=(0.0, 0.0, 0.0)) for side in _OPEN) if floor else ()
+    return Scene(
+        name=name,
+        bodies=placed + ((floor,) if floor else ()),
+        contacts=_contacts(contacts, bodies, floor, mu),
+        absorbing=(*more.pop("absorbing", ()), *sides),
+        gravity=down,
+        impact=impact or ImpactPhase(duration=duration, output_interval=duration / _ROWS),
+        parameters={"height": float(height), "pose": pose, "onto": onto},
+        **more,
+    )
+
+
+def _check(bodies: Sequence[Body], contacts: Sequence[object], onto: str, more: Mapping[str, object]) -> None:
+    """Raise RequestError for what no drop can be of."""
+    validate.members("drop_test", Body, parts=bodies)
+    validate.members("drop_test", (Contact, ContactAll), contacts=contacts)
+    if not bodies:
+        raise bad_value("drop_test.parts", (), "give at least one body")
+    if onto not in FLOORS:
+        raise bad_value("drop_test.onto", validate.brief(onto), f"choose {', '.join(FLOORS)}")
+    for field in {"bodies", "parameters"} & set(more):
+        raise bad_value(f"drop_test.{field}", validate.brief(more[field]), "drop_test makes it; leave it out")
+
+
+def _contacts(
+    contacts: Sequence[Contact | ContactAll], bodies: Sequence[Body], floor: Body | None, mu: float
+) -> tuple[Contact | ContactAll, ...]:
+    """The contacts of the bodies with each other, and of each with the floor, which has none with itself."""
+    master = Surface(body="floor", nodes="zmax") if floor else RigidPlane(normal=(0.0, 0.0, 1.0))
+    skins = [Surface(body=body.name, nodes="boundary") for body in bodies if not body.is_inertia]
+    among = [
+        replace(c, exclude=(*c.exclude, ("floor", "floor"))) if floor and isinstance(c, ContactAll) else c
+        for c in contacts
+    ]
+    return (*among, *(Contact(slave=skin, master=master, mu=mu) for skin in skins))
+
+
+_OPEN = ("xmin", "xmax", "ymin", "ymax", "zmin")  # sides of a real floor that let waves out
+
+
+@dataclass(frozen=True)
+class Extent:
+    """The box around parts, in the frame in which they are given.
+
+    Attributes:
+        low, high: its corners [m], shape (3,), float64.
+        centre: of mass [m], shape (3,), float64.
+    """
+
+    low: Array
+    high: Array
+    centre: Array
+
+    @property
+    def diagonal(self) -> float:
+        """Of the box [m]."""
+        return float(np.linalg.norm(self.high - self.low))
+
+
+def pose_rotation(pose: str, extent: Extent) -> Array:
+    """Matrix that turns parts from the frame in which they are given into a pose above z = 0, shape (3, 3), float64.
+
+    Raises:
+        RequestError: there is no such pose.
+    """
+    remedy = f"choose {', '.join(NAMED)}, one of POSES, as {', '.join(POSES[::9])}, or two angles, as 30/45"
+    if not isinstance(pose, str):
+        raise bad_value("drop_test.pose", validate.brief(pose), remedy)
+    if angles := _ANGLES.fullmatch(pose):
+        try:
+            a, b = (math.radians(float(angle)) for angle in angles.groups())
+        except ValueError:
+            raise bad_value("drop_test.pose", pose, remedy) from None
+        if not math.isfinite(a + b):
+            raise bad_value("drop_test.pose", pose, remedy)
+        return rotation_matrix((0.0, b, 0.0)) @ rotation_matrix((a, 0.0, 0.0))
+    side = NAMED.get(pose, pose)
+    if side not in POSES:
+        raise bad_value("drop_test.pose", pose, remedy)
+    down = np.zeros(3)
+    for word in side.split("-"):
+        axis = "xyz".index(word[0])
+        down[axis] = (extent.low if word.endswith("min") else extent.high)[axis] - extent.centre[axis]
+    return _turning(down / np.linalg.norm(down))
+
+
+def _turning(down: Array) -> Array:
+    """The smallest rotation that turns a unit vector to -z; about x where it is +z."""
+    target = np.array([0.0, 0.0, -1.0])
+    axis = np.cross(down, target)
+    sine, cosine = float(np.linalg.norm(axis)), float(down @ target)
+    if sine < 1e-12:
+        return np.eye(3) if cosine > 0.0 else np.diag([1.0, -1.0, -1.0])
+    return rotation_matrix(axis / sine * math.atan2(sine, cosine))
+
+
+def _extent(bodies: Sequence[Body]) -> Extent:
+    """The box around bodies and their centre of mass, in the scene's frame."""
+    lows, highs, mass, moment = [], [], 0.0, np.zeros(3)
+    for body in bodies:
+        rotation, position = rotation_matrix(np.array(body.rotation)), np.array(body.position)
+        mesh = _mesh(body)
+        points = mesh.points @ rotation.T + position
+        lows.append(points.min(axis=0))
+        highs.append(points.max(axis=0))
+        own, centre = _mass(body, mesh)
+        mass += own
+        moment += own * (rotation @ centre + position)
+    return Extent(np.min(lows, axis=0), np.max(highs, axis=0), moment / mass)
+
+
+def _mesh(body: Body) -> Mesh:
+    from warp_mca.geometry.mesh import Mesh
+
+    return body.geometry if isinstance(body.geometry, Mesh) else body.geometry.build()
+
+
+def _mass(body: Body, mesh: Mesh) -> tuple[float, Array]:
+    """Mass of a body [kg] and its centre in the body's frame [m]."""
+    from warp_mca.geometry.cell_types import linear_type
+    from warp_mca.geometry.quality import volumes
+    from warp_mca.geometry.shape_volume import of_cells
+
+    if body.mass is not None:
+        return body.mass, np.array(body.centre)
+    weight = volumes(mesh) * (of_cells(mesh) if body.exact_mass else 1.0)
+    if isinstance(body.material, Mapping):
+        density = np.full(mesh.cell_count, getattr(body.material.get("*"), "rho", math.nan))
+        for name, material in body.material.items():
+            if name in mesh.cell_sets:
+                density[mesh.cell_sets[name]] = material.rho
+        weight = weight * density
+    else:
+        weight = weight * body.material.rho
+    middle = np.concatenate(
+        [mesh.points[cells[:, : linear_type(name).corners]].mean(axis=1) for name, cells in mesh.cells.items()]
+    )
+    mass = float(np.nansum(weight))
+    return mass, np.nansum(weight[:, None] * middle, axis=0) / mass
+
+
+def _placed(bodies: Sequence[Body], turn: Array) -> list[Body]:
+    """Bodies turned about the origin, then moved so that the lowest node of all is above z = 0, the middle on z."""
+    from scipy.spatial.transform import Rotation
+
+    turned, lows, highs = [], [], []
+    for body in bodies:
+        rotation = turn @ rotation_matrix(np.array(body.rotation))
+        position = turn @ np.array(body.position)
+        points = _mesh(body).points @ rotation.T + position
+        lows.append(points.min(axis=0))
+        highs.append(points.max(axis=0))
+        turned.append((body, rotation, position))
+    low, high = np.min(lows, axis=0), np.max(highs, axis=0)
+    shift = np.array([*(-0.5 * (low + high)[:2]), GAP - low[2]])
+    return [
+        replace(
+            body,
+            position=tuple((position + shift).tolist()),
+            rotation=tuple(Rotation.from_matrix(rotation).as_rotvec().tolist()),
+            velocity=tuple((turn @ np.array(body.velocity)).tolist()),
+            angular_velocity=tuple((turn @ np.array(body.angular_velocity)).tolist()),
+        )
+        for body, rotation, position in turned
+    ]
+
+
+def _floor(onto: str, length: float) -> Body | None:
+    """A block below z = 0 for parts of this diagonal [m]; None for a rigid floor."""
+    from warp_mca.geometry.box import Box
+
+    material = FLOORS[onto]
+    if material is None:
+        return None
+    width, depth = _WIDTH * length, _DEPTH * length
+    cells = (_CELLS, _CELLS, round(_CELLS * depth / width))
+    block = Box(size=(width, width, depth), divisions=cells, origin=(-0.5 * width, -0.5 * width, -depth))
+    return Body(name="floor", geometry=block, material=material)
