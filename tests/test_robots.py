@@ -230,3 +230,15 @@ def test_machine_needs_the_extra_and_says_so(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(RequestError, match=r'pip install "warp_mca\[robots\]"'):
         robot(STOP, tmp_path).swing(t_end=0.1)
+
+
+def test_warnings_of_mujoco_go_to_the_log_and_to_no_file(tmp_path, monkeypatch, caplog):
+    """Two hinges on one axis: MuJoCo warns of a singular mass matrix before the machine is refused."""
+    monkeypatch.chdir(tmp_path)
+    hinges = '<joint name="a" axis="0 0 1"/><joint name="b" axis="0 0 1"/><geom size="0.1"/>'
+    machine = robot(f"{HEAD}<worldbody><body>{hinges}</body></worldbody></mujoco>", tmp_path)
+    with pytest.raises(RequestError, match="they move nothing, or the same"):
+        machine.swing(t_end=0.1)
+    assert [path.name for path in tmp_path.iterdir()] == ["machine.xml"]
+    assert ["Inertia matrix is too close to singular" in line for line in caplog.messages] == [True]
+    assert mujoco.MjLogConfig.get().logto_file  # as it was

@@ -16,6 +16,7 @@ from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.robots.warned import warnings_logged
 from warp_mca.scene import Body, Fixed, ImpactPhase, PositionServo, RigidPlane, Scene
 from warp_mca.scene.materials import Material
 
@@ -119,6 +120,7 @@ class Robot:
             raise bad_value(f"{owner}.rigid", True, "links that are not named in flexible are rigid; leave it out")
         return replace(item, name=name)
 
+    @warnings_logged()
     def swing(self, *, t_max: float = 5.0, t_end: float | None = None) -> RobotSwing:
         """Swing from the start until the machine touches something, or to a time.
 
@@ -153,6 +155,7 @@ class Robot:
             raise bad_value("closest gap of the machine [m]", gap, remedy)
         return found
 
+    @warnings_logged()
     def strike(
         self,
         *,
@@ -207,6 +210,7 @@ class Robot:
         scene = HandOff(self, machine, found).scene(impact, self._pairs(machine), (stiffness, mu, faces), name)
         return replace(scene, fixed=(*scene.fixed, *fixed))
 
+    @warnings_logged()
     def after(self, swing: RobotSwing, scene: Scene, result: Result) -> HandBack:
         """The machine after an impact, to swing on.
 
