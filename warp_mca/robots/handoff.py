@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -97,7 +97,7 @@ class HandOff:
             rest = self.machine.rests.get(name)
             if rest is not None:
                 self.bodies.append(_rigid(name + REST, rest, motion, None))
-                nodes = self.robot.mount(name, None)
+                nodes = mount(self.robot, name, None)
                 self.joints.append(Articulation(name=f"{name} mount", body=name + REST, other=name, other_nodes=nodes))
         self._add_joint(link)
 
@@ -110,7 +110,7 @@ class HandOff:
             return name, None
         if self.machine.rests.get(name) is not None:
             return name + REST, None
-        return name, self.robot.mount(name, self.names.body(neighbour))
+        return name, mount(self.robot, name, self.names.body(neighbour))
 
     def _add_joint(self, link: int) -> None:
         """The joint between a link and its parent; none where it flies freely."""
@@ -167,6 +167,22 @@ class HandOff:
         at = machine.local(links[0], point)
         freedoms = (Freedom(kind="ball", at=_vec(at)),) if kind == int(mj.mjtEq.mjEQ_CONNECT) else ()
         self.joints.append(Articulation(name=name, body=body, other=other, at=_vec(at), freedoms=freedoms))
+
+
+def mount(robot: Robot, link: str, other: str | None) -> str:
+    """Node set by which a flexible link is held to another link, or to what rides on it.
+
+    Raises:
+        RequestError: none was given.
+    """
+    given = robot.mounts.get(link)
+    found = given.get(other) if isinstance(given, Mapping) else given
+    if not isinstance(found, str):
+        held = "what rides on it" if other is None else other
+        sets = ", ".join(sorted(robot.meshes[link].node_sets))
+        remedy = f"name the node set that holds it to {held}; its mesh has {sets}"
+        raise bad_value(f"Robot.mounts[{link!r}]", given, remedy)
+    return found
 
 
 def joint_name(machine: Machine, link: int) -> str:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
+from typing import Any
 
 from warp_mca.base.log import warn
 
@@ -12,7 +14,7 @@ from warp_mca.base.log import warn
 def warnings_logged() -> Iterator[None]:
     """Log what MuJoCo warns of in the block, each sentence once; it then writes no MUJOCO_LOG.TXT."""
     try:
-        import mujoco
+        mujoco: Any = import_module("mujoco")
     except ImportError:  # which is said where it is needed
         yield
         return
