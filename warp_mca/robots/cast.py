@@ -8,23 +8,19 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from warp_mca.base.arrays import Array
-from warp_mca.base.errors import RequestError
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.phases.prepare import Clock, Prepared, Request, prepare
 from warp_mca.phases.settings import settings_of
 from warp_mca.recorders.recorder import apart
 from warp_mca.robots.contacts import STEEL, turned_on
-from warp_mca.robots.geoms import filled, geom_surface, hull, joined
+from warp_mca.robots.drawing import drawn_geoms
+from warp_mca.robots.geoms import joined
 from warp_mca.robots.machine import Machine, Motion
 from warp_mca.scene import Body, Contact, ImpactPhase, RigidPlane, Scene, Surface
 
 if TYPE_CHECKING:
     from warp_mca.robots.robot import Robot
-
-HIDDEN = 3  # group of geoms from which on MuJoCo's viewer does not draw them
-AROUND = 24  # faces around a round geom
-MOST = 4000  # triangles of a mesh; finer ones are drawn as their convex hulls
 
 
 class Part(NamedTuple):
@@ -54,44 +50,21 @@ class Part(NamedTuple):
 
 
 def parts_of(robot: Robot, machine: Machine) -> list[Part]:
-    """All that is drawn of a machine and of what stands beside it.
-
-    Geoms are those that MuJoCo's viewer shows, of groups 0 to 2; of a link without any, all. Meshes that do not face
-    away from their middle everywhere, or have more than MOST triangles, are drawn as their convex hulls.
-    """
-    found, model = [], machine.model
-    geoms = [k for k in range(model.ngeom) if int(model.geom_type[k]) != int(machine.mj.mjtGeom.mjGEOM_PLANE)]
-    for link in range(model.nbody):
+    """All that is drawn of a machine and of what stands beside it."""
+    found = []
+    for link in range(machine.model.nbody):
         name = machine.names.body(link)
         if link and machine.carrier(link) != link:
             continue
         if name in robot.flexible:
             found.append(Part(name, link, robot.meshes[name], deforms=True))
             continue
-        own = [k for k in geoms if machine.carrier(int(model.geom_bodyid[k])) == link]
-        seen = [k for k in own if int(model.geom_group[k]) < HIDDEN] or own
-        meshes = [mesh for mesh in (_drawn(machine, link, k) for k in seen) if mesh is not None]
-        if meshes:
-            found.append(Part(name, link, joined(meshes)))
+        if meshes := drawn_geoms(machine, link):
+            found.append(Part(name, link, joined(list(meshes.values()))))
     beside = [item for item in robot.against if isinstance(item, Body)]
     found += [Part(item.name, 0, robot.meshes[item.name], item, not item.rigid) for item in beside]
     names = apart(part.name for part in found)
     return [part._replace(name=name) for part, name in zip(found, names, strict=True)]
-
-
-def _drawn(machine: Machine, link: int, geom: int) -> Mesh | None:
-    """The mesh of a geom in the frame of the link that carries it; None of a kind without a surface."""
-    name, data = machine.names.geom(geom), machine.data
-    try:
-        points, faces = geom_surface(machine.mj, machine, geom, name, AROUND)
-    except RequestError:
-        return None
-    try:
-        mesh = filled(name, (points, faces) if len(faces) <= MOST else hull(points), name)
-    except RequestError:
-        mesh = filled(name, hull(points), name)
-    turned = np.array(data.geom_xmat[geom]).reshape(3, 3)
-    return replace(mesh, points=machine.local(link, np.array(data.geom_xpos[geom]) + mesh.points @ turned.T))
 
 
 def cast(robot: Robot, machine: Machine, parts: list[Part], t: float) -> Prepared:

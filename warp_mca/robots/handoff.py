@@ -48,13 +48,20 @@ class HandOff:
         self.bodies: list[Body] = []
         self.joints: list[Articulation] = []
 
-    def scene(self, impact: ImpactPhase, pairs: Sequence[Pair], springs: tuple[float, float, int], name: str) -> Scene:
+    def scene(
+        self,
+        impact: ImpactPhase,
+        pairs: Sequence[Pair],
+        springs: tuple[float, float, int],
+        name: str,
+        drawn: bool = False,
+    ) -> Scene:
         """The scene; `springs` are stiffness, mu and faces of `Robot.strike`, which has the other arguments too.
 
         Raises:
             RequestError: a flexible link is held nowhere, or a surface cannot be made.
         """
-        contacts = Contacts(self.robot, self.machine, self.swing, impact.duration, springs)
+        contacts = Contacts(self.robot, self.machine, self.swing, impact.duration, springs, drawn)
         contacts.add(pairs)
         model = self.machine.model
         for link in range(1, model.nbody):

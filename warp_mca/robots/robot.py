@@ -131,6 +131,7 @@ class Robot:
         swing: RobotSwing | None = None,
         fixed: tuple[Fixed, ...] = (),
         faces: int = 24,
+        drawn: bool = False,
         name: str = "strike",
     ) -> Scene:
         """The machine at its first touch as a scene, to run, to save or to change: an impact by finite elements.
@@ -150,6 +151,7 @@ class Robot:
             faces: around a round geom [-], whose middles lie 0.0086 of its radius inside at 24. Where two round geoms
                 meet, one has a flat face at the touch, as wide as these, so that the force points right while they do
                 not slide far. Softer contact needs fewer, more than that makes corners of the face touch.
+            drawn: whether geoms that cannot touch are meshed too, so that recorders show whole links.
             fixed: nodes of bodies beside the machine that are held.
             name: of the scene.
 
@@ -163,6 +165,7 @@ class Robot:
         validate.kinds("Robot.strike", ImpactPhase, "give an ImpactPhase", impact=impact)
         validate.positive("Robot.strike", stiffness=stiffness)
         validate.counts("Robot.strike", faces=faces)
+        validate.flags("Robot.strike", drawn=drawn)
         if faces % 4 or faces < 8:
             raise bad_value("Robot.strike.faces", faces, "give a multiple of 4, 8 at least")
         if self.period is not None and self.period < impact.duration:
@@ -173,7 +176,7 @@ class Robot:
         machine = self._machine()
         if len(found.qpos) != machine.nq or len(found.qvel) != machine.nv or not machine.made(found):
             raise bad_value("Robot.strike.swing", f"RobotSwing to {found.t_end:.6g} s", "it is of another machine")
-        scene = HandOff(self, machine, found).scene(impact, self.pairs(machine), (stiffness, mu, faces), name)
+        scene = HandOff(self, machine, found).scene(impact, self.pairs(machine), (stiffness, mu, faces), name, drawn)
         return replace(scene, fixed=(*scene.fixed, *fixed))
 
     @warnings_logged()

@@ -75,9 +75,9 @@ def doubled_node(c: Context, _: float) -> Iterator[Values]:
     "piece at most",
 )
 def loose_pieces(c: Context, most: float) -> Iterator[Values]:
-    """Pieces of such meshes, without doubled nodes."""
+    """Pieces of such meshes, without doubled nodes; a mass that is given holds its pieces together."""
     for name, mesh in _foreign(c):
-        if (count := pieces(mesh)) > most and not doubled_nodes(mesh):
+        if c.scene.body(name).mass is None and (count := pieces(mesh)) > most and not doubled_nodes(mesh):
             yield dict(body=name, count=count)
 
 
