@@ -30,6 +30,8 @@ def refuse_at_hand_off(machine: Machine) -> None:
             raise bad_value("Robot: flag", f"{flag.lower()} disabled", remedy)
     for k in range(model.njnt):
         dofs = slice(int(model.jnt_dofadr[k]), int(model.jnt_dofadr[k]) + machine.rates_of(k))
+        if (least := float(model.dof_damping[dofs].min())) < 0.0:
+            raise bad_value(f"damping of joint {names.joint(k)}", least, "it drives the joint; give 0 or more")
         several = dofs.stop - dofs.start > 1
         free = int(model.jnt_type[k]) == int(mj.mjtJoint.mjJNT_FREE)
         for what, value in (
