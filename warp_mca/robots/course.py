@@ -97,7 +97,7 @@ class _Course:
         first = self.film is None
         if self.film is None:
             self.film = RobotFilm(self._robot, machine, found, self._recorders, self._t_end)
-        self.film.swing(found, start, first, found.touch is not None)
+        self.film.swing(self._robot, found, start, first, found.touch is not None)
 
     def _impact(self, found: RobotSwing, start: float) -> None:
         robot, film = self._robot, self.film

@@ -27,6 +27,7 @@ from warp_mca.recorders.recorder import (
 )
 from warp_mca.robots.cast import Part, cast, parts_of, placed
 from warp_mca.robots.machine import Machine
+from warp_mca.scene import Body
 
 if TYPE_CHECKING:
     from warp_mca.robots.robot import Robot
@@ -40,6 +41,7 @@ class RobotFilm:
 
     Attributes:
         said: what they warned of.
+        beside: bodies beside the machine at the start of the latest swing, by name.
         recording: what passes frames on to them.
     """
 
@@ -66,34 +68,35 @@ class RobotFilm:
         info = RunInfo(ready.scene, ready.model, self.surfaces, {}, steps.dt, steps.interval, length, told, phases=True)
         self.recording = Recording(recorders, info, 0, steps.per_interval, None)
 
-    def swing(self, swing: RobotSwing, start: float, first: bool, following: bool) -> None:
-        """Show a swing that began at a time of the run [s]; an impact shows where it began, or follows."""
+    def swing(self, robot: Robot, swing: RobotSwing, start: float, first: bool, following: bool) -> None:
+        """Show a robot's swing that began at a time of the run [s]; an impact shows where it began, or follows."""
+        self.beside = {item.name: item for item in robot.against if isinstance(item, Body)}
         rows = range(len(swing.t))[slice(0 if first else 1, -1 if following else None)]
         if not rows:
             return
         interval = float(swing.t[1] - swing.t[0]) if len(swing.t) > 1 else 1.0
         self.recording.follow(start + float(swing.t[rows[0]]) - self.origin, interval, len(rows) - 1)
         for number, row in enumerate(rows):
-            self.recording.show(number, lambda _, row=row: self._swinging(swing, start, row))
+            self.recording.show(number, lambda _, row=row: self._swinging(swing, row))
 
     def impact(self, swing: RobotSwing, start: float) -> Recorder:
         """What records the impact after a swing that began at a time of the run [s]."""
-        return _ImpactFilm(self, start + swing.t_end, self._place(swing, len(swing.t) - 1, start))
+        return _ImpactFilm(self, start + swing.t_end, self._place(swing, len(swing.t) - 1))
 
     def finish(self, ok: bool) -> None:
         """Close the recorders of a run that ended as it should, or did not."""
         self.recording.finish(ok)
 
-    def _place(self, swing: RobotSwing, row: int, start: float) -> dict[str, tuple[Array, Array]]:
-        """Positions [m] and velocities [m/s] of all parts at a sample of a swing that began at `start` [s]."""
+    def _place(self, swing: RobotSwing, row: int) -> dict[str, tuple[Array, Array]]:
+        """Positions [m] and velocities [m/s] of all parts at a sample of a swing."""
         machine = self._machine
         machine.advance(np.concatenate([swing.qpos_t[row], swing.qvel_t[row], np.zeros(2)]))
-        t = start + float(swing.t[row])
-        return {part.name: placed(part.mesh, part.motion(machine, t)) for part in self.parts}
+        now = [part._replace(beside=part.beside and self.beside[part.beside.name]) for part in self.parts]
+        return {part.name: placed(part.mesh, part.motion(machine, float(swing.t[row]))) for part in now}
 
-    def _swinging(self, swing: RobotSwing, start: float, row: int) -> Fields:
+    def _swinging(self, swing: RobotSwing, row: int) -> Fields:
         x, v = np.zeros_like(self.model.X), np.zeros_like(self.model.X)
-        for name, (points, rates) in self._place(swing, row, start).items():
+        for name, (points, rates) in self._place(swing, row).items():
             own = slice(self.model.node_start[name], self.model.node_start[name] + len(points))
             x[own], v[own] = points, rates
         return self.fields(x, v)

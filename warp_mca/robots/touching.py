@@ -20,9 +20,7 @@ if TYPE_CHECKING:
     from warp_mca.robots.robot import Robot
 
 FAR = 1e3  # beyond which distances are not told apart [m]
-BEYOND = (
-    0.1  # of the machine's extent, twice the way in a step: geoms of meshes farther apart have their hulls' distance
-)
+BEYOND = 0.1  # of the machine's extent, twice the way in a step: farther geoms have the distance of their hulls
 
 
 class Pose(NamedTuple):
