@@ -44,6 +44,10 @@ def _summary(key: str) -> Callable[[mca.Result, Values], float]:
     return lambda result, p: float(result.summary[key])
 
 
+def _stress_of(body: str) -> Callable[[mca.Result, Values], float]:
+    return lambda result, p: float(result.summary["bodies"][body]["max_von_mises"]["value"])
+
+
 def _last(column: str) -> Callable[[mca.Result, Values], float]:
     return lambda result, p: float(result[column][-1])
 
@@ -311,5 +315,23 @@ SCENES: dict[str, Picture] = {
         measured=_turning,
         known=lambda p: float(p["precession"]),
         theory="steady precession, from which the spin is set",
+    ),
+    "arm_strike": Picture(
+        at=0.3,
+        quantity="greatest von Mises stress of the bar",
+        unit="Pa",
+        measured=_stress_of("tool"),
+    ),
+    "leg_landing": Picture(
+        at=0.3,
+        quantity="greatest von Mises stress of the shin",
+        unit="Pa",
+        measured=_stress_of("shin"),
+    ),
+    "gripper": Picture(
+        at=0.15,
+        quantity="greatest von Mises stress of the part",
+        unit="Pa",
+        measured=_stress_of("part"),
     ),
 }

@@ -20,6 +20,7 @@ pytestmark = pytest.mark.usefixtures("no_figures")
 FACTORS = (0.5, 0.7, 1.3, 2.0)
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
 FINISHED = ("graded_bars", "stick_slip", "strained_element", "two_metal_bar")  # their bodies are meshes, no recipes
+FINISHED += ("arm_strike", "gripper", "leg_landing")
 PLATE = {"plate_core_depth": 2, "plate_layers": 4, "plate_extension": 3}
 SMALL: dict[str, dict[str, Any]] = {
     "single_link": {"axial": 6, "plate_core": 4, **PLATE},

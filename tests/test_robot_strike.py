@@ -178,6 +178,7 @@ def test_a_mesh_beside_its_link_is_refused_by_its_place(tmp_path):
     [
         ('<body name="fore"', '<body name="fore" gravcomp="1"', "gravcomp of link fore"),
         ("</worldbody>", f"</worldbody>{GEARED}", "equality"),
+        ('range="-2.2 2.2" damping="0.05"', 'range="-2.2 2.2" damping="-0.05"', "damping of joint j5 = -0.05"),
         ('integrator="RK4"/>', 'integrator="RK4"><flag damper="disable"/></option>', "damper disabled"),
     ],
 )
@@ -362,3 +363,28 @@ def test_swings_of_other_machines_and_freedoms_that_are_one_are_refused(tmp_path
     joint = mca.Articulation(name="J", body="rod", freedoms=(mca.Freedom(), mca.Freedom()))
     with pytest.raises(mca.RequestError, match="two make the same motion"):
         mca.Scene(name="s", bodies=(rod,), joints=(joint,), impact=mca.ImpactPhase(duration=1e-3))
+
+
+def test_compensated_gravity_is_not_felt_in_an_impact(tmp_path):
+    """Links feel (1 - gravcomp) g, a flexible body beside all of it; links that differ are refused."""
+    text = """<mujoco><worldbody>
+      <body name="a" gravcomp="0.75"><joint name="h" axis="0 1 0"/><geom size="0.1" mass="1"/>
+        <body name="b" gravcomp="0.75" pos="0.5 0 0"><geom name="head" size="0.1" mass="1"/></body>
+      </body></worldbody></mujoco>"""
+    beside = mca.Body(name="block", geometry=mca.Box(size=(0.1,) * 3, divisions=(1, 1, 1)), material=STEEL)
+    beside = replace(beside, position=(2.0, 0.0, 0.0))
+    machine = robot(text, tmp_path, against=(beside,))
+    swing = machine.swing(t_end=1e-3)
+    scene = machine.strike(impact=mca.ImpactPhase(duration=1e-3, output_interval=1e-4), swing=swing)
+    assert scene.gravity == pytest.approx((0.0, 0.0, -9.81 / 4))
+    assert [(load.body, load.acceleration[2]) for load in scene.loads] == [("block", pytest.approx(-9.81 * 0.75))]
+    alone = replace(machine, against=())
+    scene = alone.strike(impact=scene.impact, swing=swing)
+    back = alone.after(swing, scene, mca.run(scene, precision="float64"))
+    assert back.robot.qvel == pytest.approx(alone.swing(t_end=back.robot.clock).qvel, abs=1e-8)
+    unlike = robot(text.replace('name="b" gravcomp="0.75"', 'name="b"'), tmp_path)
+    with pytest.raises(mca.RequestError, match=r"gravcomp of link b = 0\.0: other links have 0.75"):
+        unlike.strike(impact=scene.impact, swing=unlike.swing(t_end=1e-3))
+    rigid = robot(text, tmp_path, against=(replace(beside, rigid=True),))
+    with pytest.raises(mca.RequestError, match="leave rigid=True out there"):
+        rigid.strike(impact=scene.impact, swing=rigid.swing(t_end=1e-3))

@@ -236,3 +236,45 @@ def test_machine_needs_the_extra_and_says_so(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(RequestError, match=r'pip install "warp_mca\[robots\]"'):
         robot(STOP, tmp_path).swing(t_end=0.1)
+
+
+def test_warnings_of_mujoco_go_to_the_log_and_to_no_file(tmp_path, monkeypatch, caplog):
+    """Two hinges on one axis: MuJoCo warns of a singular mass matrix before the machine is refused."""
+    monkeypatch.chdir(tmp_path)
+    hinges = '<joint name="a" axis="0 0 1"/><joint name="b" axis="0 0 1"/><geom size="0.1"/>'
+    machine = robot(f"{HEAD}<worldbody><body>{hinges}</body></worldbody></mujoco>", tmp_path)
+    with pytest.raises(RequestError, match="they move nothing, or the same"):
+        machine.swing(t_end=0.1)
+    assert [path.name for path in tmp_path.iterdir()] == ["machine.xml"]
+    assert ["Inertia matrix is too close to singular" in line for line in caplog.messages] == [True]
+    assert mujoco.MjLogConfig.get().logto_file  # as it was
+
+
+def test_distance_of_skins_is_that_of_all_triangles():
+    """A skin of many triangles, of which some are large, is searched by pieces: as when each is looked at."""
+    random = np.random.default_rng(1)
+    angle = np.linspace(0.0, 2.0 * np.pi, 301)[:-1]
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    points = np.concatenate([np.c_[ring, np.zeros(300)], np.c_[ring, np.full(300, 3.0)], [[0, 0, 0], [0, 0, 3.0]]])
+    k, following = np.arange(300), np.roll(np.arange(300), -1)
+    sides = [np.stack([k, following, following + 300], 1), np.stack([k, following + 300, k + 300], 1)]
+    ends = [np.stack([following, k, np.full(300, 600)], 1), np.stack([k + 300, following + 300, np.full(300, 601)], 1)]
+    skin = Skin(points, np.concatenate(sides + ends).astype(np.int32))
+    for centre in ((2.5, 0.0, 1.0), (1.2, 1.1, 3.4), (0.0, 0.3, 4.0)):
+        probes = np.array(centre) + 0.3 * random.standard_normal((40, 3))
+        distance, which, foot = skin.nearest(probes)
+        feet = np.array(
+            [min(closest_points(p, skin.triangles), key=lambda x, p=p: ((x - p) ** 2).sum()) for p in probes]
+        )
+        apart = np.linalg.norm(probes - feet, axis=1)
+        if distance > 0.0:
+            assert (distance, which) == (pytest.approx(apart.min(), rel=1e-12), int(apart.argmin()))
+            assert foot == pytest.approx(feet[which], abs=1e-12)
+        else:
+            assert abs(distance) == pytest.approx(apart[which], rel=1e-12)
+
+
+def test_without_mujoco_a_built_in_scene_says_what_is_missing(monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    with pytest.raises(RequestError, match=r'pip install "warp_mca\[robots\]"'):
+        mca.make_scene("gripper")

@@ -10,6 +10,7 @@ import numpy as np
 
 from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
+from warp_mca.robots.drawing import drawn_geoms
 from warp_mca.robots.geoms import filled, geom_surface, is_long, is_round, joined, touching_at
 from warp_mca.robots.machine import Machine, Motion
 from warp_mca.scene import Body, Contact, RigidPlane, Surface
@@ -40,9 +41,10 @@ class Contacts:
         swing: RobotSwing,
         duration: float,
         springs: tuple[float, float, int],
+        drawn: bool = False,
     ) -> None:
-        """Begin without contacts; `springs` are stiffness, mu and faces of `Robot.strike`."""
-        self._robot, self._machine, self._swing = robot, machine, swing
+        """Begin without contacts; `springs` are stiffness, mu and faces of `Robot.strike`, which has `drawn`, too."""
+        self._robot, self._machine, self._swing, self._drawn = robot, machine, swing, drawn
         self._duration, (self._stiffness, self._mu, self._faces) = duration, springs
         self.found: list[Contact] = []
         self.held: list[str] = []
@@ -142,7 +144,7 @@ class Contacts:
         return f"{geom} geom" if geom in taken else geom
 
     def geometry(self, link: int) -> Mesh | None:
-        """The mesh of the geoms of a link that may touch, in the link's frame; None without any."""
+        """The mesh of the geoms of a link that may touch or are drawn, in the link's frame; None without any."""
         machine, data = self._machine, self._machine.data
         found = []
         for geom in self._sets:
@@ -152,6 +154,8 @@ class Contacts:
             turned = np.array(data.geom_xmat[geom]).reshape(3, 3)
             world = np.array(data.geom_xpos[geom]) + mesh.points @ turned.T
             found.append(replace(mesh, points=machine.local(link, world)))
+        if self._drawn:
+            found += [mesh for geom, mesh in drawn_geoms(machine, link).items() if geom not in self._sets]
         return joined(found) if found else None
 
     def _mesh(self, geom: int) -> Mesh:
@@ -171,10 +175,27 @@ class Contacts:
             pose = Motion(np.array(machine.data.geom_xpos[geom]), turned, zero, zero)
             body = Body(name=self._beside_name(name), geometry=self._mesh(geom), material=STEEL, rigid=True)
             found.append(replace(body, position=_vec(pose.origin), rotation=_vec(pose.turn())))
+        if self._drawn:
+            found += self._scenery()
         for item in self._robot.against:
             if isinstance(item, Body):
                 moved = np.array(item.position) + t * np.array(item.velocity)
                 found.append(replace(item, position=_vec(moved), rotation=_vec(turned_on(item, t))))
+        return found
+
+    def _scenery(self) -> list[Body]:
+        """Bodies of all other geoms of the world, and of links that do not move."""
+        machine, found = self._machine, []
+        for link in range(machine.model.nbody):
+            if int(machine.model.body_weldid[link]) != 0:
+                continue
+            meshes = [mesh for geom, mesh in drawn_geoms(machine, link).items() if geom not in self._sets]
+            if meshes and machine.carrier(link) == link:
+                motion, name = machine.motion(link), f"{machine.names.body(link)} drawn"
+                own = {"mass": 1.0, "inertia": (1.0, 1.0, 1.0)}  # which tells that its shape is drawn only
+                body = Body(name=name, geometry=joined(meshes), material=STEEL, rigid=True, **own)
+                found.append(replace(body, position=_vec(motion.origin), rotation=_vec(motion.turn())))
+                self.held.append(name)
         return found
 
 

@@ -28,11 +28,10 @@ def refuse_at_hand_off(machine: Machine) -> None:
         if int(model.opt.disableflags) & int(getattr(mj.mjtDisableBit, f"mjDSBL_{flag}")):
             remedy = "an impact has springs, dampers and clamps of controls; take this flag out of the file's option"
             raise bad_value("Robot: flag", f"{flag.lower()} disabled", remedy)
-    for k in range(1, model.nbody):
-        if model.body_gravcomp[k]:
-            raise bad_value(f"gravcomp of link {names.body(k)}", float(model.body_gravcomp[k]), "leave it out")
     for k in range(model.njnt):
         dofs = slice(int(model.jnt_dofadr[k]), int(model.jnt_dofadr[k]) + machine.rates_of(k))
+        if (least := float(model.dof_damping[dofs].min())) < 0.0:
+            raise bad_value(f"damping of joint {names.joint(k)}", least, "it drives the joint; give 0 or more")
         several = dofs.stop - dofs.start > 1
         free = int(model.jnt_type[k]) == int(mj.mjtJoint.mjJNT_FREE)
         for what, value in (
@@ -45,6 +44,28 @@ def refuse_at_hand_off(machine: Machine) -> None:
             if several and value:
                 remedy = "an impact carries it for hinges and slides; leave it out, or give hinges that meet"
                 raise bad_value(f"{what} of joint {names.joint(k)}", float(value), remedy)
+
+
+def compensated(machine: Machine) -> float:
+    """Share of gravity that is compensated in the moving links (gravcomp), the same in all that have mass [-].
+
+    Raises:
+        RequestError: it differs from link to link, or drives with clamps hold it.
+    """
+    model, first = machine.model, None
+    for k in range(1, model.nbody):
+        if not model.body_weldid[k] or not model.body_mass[k]:
+            continue
+        found = float(model.body_gravcomp[k])
+        if first is not None and found != first:
+            remedy = f"other links have {first:g}, and an impact carries one value; give all links the same"
+            raise bad_value(f"gravcomp of link {machine.names.body(k)}", found, remedy)
+        first = found
+    held = model.jnt_actgravcomp.astype(bool) & model.jnt_actfrclimited.astype(bool)
+    if first and held.any():
+        name = machine.names.joint(int(np.flatnonzero(held)[0]))
+        raise bad_value(f"actuatorgravcomp of joint {name}", True, "its clamp acts on it; leave actuatorfrcrange out")
+    return first or 0.0
 
 
 class Drive(NamedTuple):

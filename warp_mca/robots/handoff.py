@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -12,9 +12,9 @@ from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.robots.contacts import Contacts
-from warp_mca.robots.drives import freedom_of, refuse_at_hand_off
+from warp_mca.robots.drives import compensated, freedom_of, refuse_at_hand_off
 from warp_mca.robots.masses import MassProperties, of_link
-from warp_mca.scene import Articulation, Body, Fixed, Freedom, Scene
+from warp_mca.scene import Articulation, Body, BodyForce, Fixed, Freedom, Scene
 from warp_mca.scene.phases import ImpactPhase
 
 if TYPE_CHECKING:
@@ -48,13 +48,20 @@ class HandOff:
         self.bodies: list[Body] = []
         self.joints: list[Articulation] = []
 
-    def scene(self, impact: ImpactPhase, pairs: Sequence[Pair], springs: tuple[float, float, int], name: str) -> Scene:
+    def scene(
+        self,
+        impact: ImpactPhase,
+        pairs: Sequence[Pair],
+        springs: tuple[float, float, int],
+        name: str,
+        drawn: bool = False,
+    ) -> Scene:
         """The scene; `springs` are stiffness, mu and faces of `Robot.strike`, which has the other arguments too.
 
         Raises:
             RequestError: a flexible link is held nowhere, or a surface cannot be made.
         """
-        contacts = Contacts(self.robot, self.machine, self.swing, impact.duration, springs)
+        contacts = Contacts(self.robot, self.machine, self.swing, impact.duration, springs, drawn)
         contacts.add(pairs)
         model = self.machine.model
         for link in range(1, model.nbody):
@@ -64,7 +71,7 @@ class HandOff:
             if model.eq_active0[k]:
                 self._add_loop(k)
         self.bodies += contacts.beside()
-        flags, off = int(model.opt.disableflags), int(self.machine.mj.mjtDisableBit.mjDSBL_GRAVITY)
+        gravity, loads = self._gravity()
         touch = self.swing.touch
         facts: dict[str, object] = {"robot": str(self.robot.path), "swing": self.swing.t_end}
         if touch:
@@ -76,10 +83,28 @@ class HandOff:
             joints=tuple(self.joints),
             fixed=tuple(Fixed(body=body, nodes="boundary") for body in contacts.held),
             contacts=tuple(contacts.found),
-            gravity=(0.0, 0.0, 0.0) if flags & off else tuple(float(g) for g in model.opt.gravity),  # type: ignore[arg-type]
+            gravity=gravity,
+            loads=loads,
             impact=impact,
             parameters=facts,
         )
+
+    def _gravity(self) -> tuple[Any, tuple[BodyForce, ...]]:
+        """Gravity that the links feel [m/s^2], and what bodies beside feel of it where links are compensated.
+
+        Raises:
+            RequestError: a rigid body beside would feel less of it.
+        """
+        model, share = self.machine.model, compensated(self.machine)
+        if int(model.opt.disableflags) & int(self.machine.mj.mjtDisableBit.mjDSBL_GRAVITY):
+            return (0.0, 0.0, 0.0), ()
+        g = np.array(model.opt.gravity)
+        beside = [item for item in self.robot.against if isinstance(item, Body)] if share and g.any() else []
+        for item in beside:
+            if item.rigid:
+                remedy = "links with gravcomp go with flexible bodies beside; leave rigid=True out there"
+                raise bad_value("Robot.against", item.name, remedy)
+        return _vec((1.0 - share) * g), tuple(BodyForce(body=b.name, acceleration=_vec(share * g)) for b in beside)
 
     def _moves(self, link: int) -> bool:
         return int(self.machine.model.body_weldid[link]) != 0
@@ -97,7 +122,7 @@ class HandOff:
             rest = self.machine.rests.get(name)
             if rest is not None:
                 self.bodies.append(_rigid(name + REST, rest, motion, None))
-                nodes = self.robot.mount(name, None)
+                nodes = mount(self.robot, name, None)
                 self.joints.append(Articulation(name=f"{name} mount", body=name + REST, other=name, other_nodes=nodes))
         self._add_joint(link)
 
@@ -110,7 +135,7 @@ class HandOff:
             return name, None
         if self.machine.rests.get(name) is not None:
             return name + REST, None
-        return name, self.robot.mount(name, self.names.body(neighbour))
+        return name, mount(self.robot, name, self.names.body(neighbour))
 
     def _add_joint(self, link: int) -> None:
         """The joint between a link and its parent; none where it flies freely."""
@@ -167,6 +192,22 @@ class HandOff:
         at = machine.local(links[0], point)
         freedoms = (Freedom(kind="ball", at=_vec(at)),) if kind == int(mj.mjtEq.mjEQ_CONNECT) else ()
         self.joints.append(Articulation(name=name, body=body, other=other, at=_vec(at), freedoms=freedoms))
+
+
+def mount(robot: Robot, link: str, other: str | None) -> str:
+    """Node set by which a flexible link is held to another link, or to what rides on it.
+
+    Raises:
+        RequestError: none was given.
+    """
+    given = robot.mounts.get(link)
+    found = given.get(other) if isinstance(given, Mapping) else given
+    if not isinstance(found, str):
+        held = "what rides on it" if other is None else other
+        sets = ", ".join(sorted(robot.meshes[link].node_sets))
+        remedy = f"name the node set that holds it to {held}; its mesh has {sets}"
+        raise bad_value(f"Robot.mounts[{link!r}]", given, remedy)
+    return found
 
 
 def joint_name(machine: Machine, link: int) -> str:

@@ -13,6 +13,7 @@ from warp_mca.base.rotation import rotation_matrix
 from warp_mca.robots.masses import MassProperties, of_link, regular, rest_of
 from warp_mca.robots.reading import Names, compiled, mujoco, with_masses
 from warp_mca.robots.start import start_of
+from warp_mca.robots.warned import warnings_logged
 
 if TYPE_CHECKING:
     from warp_mca.robots.robot import Robot
@@ -64,6 +65,7 @@ class Machine:
         limit_damping: of these limits [N m s/rad, N s/m], float64.
     """
 
+    @warnings_logged()
     def __init__(self, robot: Robot) -> None:
         """Compile the file and set the start.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -72,10 +73,16 @@ def with_masses(mj: Any, robot: Robot, spec: Any, masses: Mapping[str, MassPrope
 
 
 def _compiled(robot: Robot, spec: Any) -> Any:
-    try:
-        return spec.compile()
-    except (ValueError, RuntimeError) as error:
-        raise bad_value("Robot.file", robot.path, f"MuJoCo says: {_words(error)}; correct the file") from error
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        try:
+            model = spec.compile()
+        except (ValueError, RuntimeError) as error:
+            raise bad_value("Robot.file", robot.path, f"MuJoCo says: {_words(error)}; correct the file") from error
+    handle = mujoco("Robot.file", robot.path).get_mju_user_warning() or warnings.warn  # that of `warnings_logged`
+    for item in said:
+        handle(str(item.message))
+    return model
 
 
 def _parsed(mj: Any, robot: Robot) -> Any:

@@ -16,11 +16,15 @@ from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.robots.checks import check, flexible_body
+from warp_mca.robots.warned import warnings_logged
 from warp_mca.scene import Body, Fixed, ImpactPhase, PositionServo, RigidPlane, Scene
 from warp_mca.scene.materials import Material
 
 if TYPE_CHECKING:
+    from warp_mca.recorders.recorder import Recorder
     from warp_mca.results.result import Result
+    from warp_mca.robots.course import RobotRun
     from warp_mca.robots.handback import HandBack
     from warp_mca.robots.machine import Machine
     from warp_mca.robots.masses import MassProperties
@@ -77,51 +81,12 @@ class Robot:
     touch: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        validate.kinds("Robot", (str, os.PathLike), "give the path of a file", path=self.path)
+        check(self)
         object.__setattr__(self, "path", os.fspath(self.path))
-        validate.kinds("Robot", Mapping, "give a Body for each link by its name", flexible=self.flexible)
-        validate.kinds("Robot", Mapping, "give a PositionServo for each joint by its name", servos=self.servos)
-        validate.kinds("Robot", Mapping, "give the node set that holds each flexible link", mounts=self.mounts)
-        for name, servo in self.servos.items():
-            validate.kind_of(f"Robot.servos[{name!r}]", servo, PositionServo, "give a PositionServo")
-            if not validate.is_number(servo.target):
-                raise bad_value(f"Robot.servos[{name!r}].target", "Amplitude", "give a number, or a controller")
-        object.__setattr__(self, "flexible", {name: self._body(name, item) for name, item in self.flexible.items()})
-        validate.kinds("Robot", (str, NoneType), "give the name of a keyframe", keyframe=self.keyframe)
-        validate.members("Robot", (RigidPlane, Body), against=self.against)
-        for item in self.against:
-            if isinstance(item, Body) and item.is_inertia:
-                raise bad_value("Robot.against", item.name, "it is a mass without surface; give it a geometry")
-        validate.kinds("Robot", (tuple, list), "give a tuple of names", touch=self.touch)
-        validate.texts("Robot", **{f"touch[{k}]": name for k, name in enumerate(self.touch)})
-        validate.unique("Robot.against", [body.name for body in self.against if isinstance(body, Body)], "body")
-        if self.controller is not None and not callable(self.controller):
-            raise bad_value("Robot.controller", validate.brief(self.controller), "give a function of (t, qpos, qvel)")
-        if (self.controller is None) != (self.period is None):
-            raise bad_value("Robot.period", self.period, "give a controller and the period at which it is called")
-        if self.period is not None:
-            validate.times("Robot", period=self.period)
-        validate.finite("Robot", clock=self.clock)
+        bodies = {name: flexible_body(name, item, self.material) for name, item in self.flexible.items()}
+        object.__setattr__(self, "flexible", bodies)
 
-    def _body(self, name: str, item: Any) -> Body:
-        """The body that a flexible link is made of, by the link's name.
-
-        Raises:
-            RequestError: it is none, is rigid, or moves by itself.
-        """
-        owner = f"Robot.flexible[{name!r}]"
-        validate.texts("Robot", flexible=name)
-        if not isinstance(item, Body):
-            if self.material is None:
-                raise bad_value("Robot.material", None, f"give the material of {owner}, or a Body there")
-            return Body(name=name, geometry=item, material=self.material)
-        for key in ("velocity", "angular_velocity"):
-            if any(getattr(item, key)):
-                raise bad_value(f"{owner}.{key}", getattr(item, key), "a link moves as the machine does; leave it 0")
-        if item.rigid:
-            raise bad_value(f"{owner}.rigid", True, "links that are not named in flexible are rigid; leave it out")
-        return replace(item, name=name)
-
+    @warnings_logged()
     def swing(self, *, t_max: float = 5.0, t_end: float | None = None) -> RobotSwing:
         """Swing from the start until the machine touches something, or to a time.
 
@@ -145,7 +110,7 @@ class Robot:
             validate.times("Robot.swing", t_end=t_end)
             return swing(self, self._machine(), (), t_end, stops=False)
         machine = self._machine()
-        pairs = self._pairs(machine)
+        pairs = self.pairs(machine)
         if not pairs:
             remedy = "nothing may touch: name in against what stands beside the machine, or give a t_end"
             raise bad_value("Robot.against", (), remedy)
@@ -156,6 +121,7 @@ class Robot:
             raise bad_value("closest gap of the machine [m]", gap, remedy)
         return found
 
+    @warnings_logged()
     def strike(
         self,
         *,
@@ -165,6 +131,7 @@ class Robot:
         swing: RobotSwing | None = None,
         fixed: tuple[Fixed, ...] = (),
         faces: int = 24,
+        drawn: bool = False,
         name: str = "strike",
     ) -> Scene:
         """The machine at its first touch as a scene, to run, to save or to change: an impact by finite elements.
@@ -184,6 +151,7 @@ class Robot:
             faces: around a round geom [-], whose middles lie 0.0086 of its radius inside at 24. Where two round geoms
                 meet, one has a flat face at the touch, as wide as these, so that the force points right while they do
                 not slide far. Softer contact needs fewer, more than that makes corners of the face touch.
+            drawn: whether geoms that cannot touch are meshed too, so that recorders show whole links.
             fixed: nodes of bodies beside the machine that are held.
             name: of the scene.
 
@@ -197,6 +165,7 @@ class Robot:
         validate.kinds("Robot.strike", ImpactPhase, "give an ImpactPhase", impact=impact)
         validate.positive("Robot.strike", stiffness=stiffness)
         validate.counts("Robot.strike", faces=faces)
+        validate.flags("Robot.strike", drawn=drawn)
         if faces % 4 or faces < 8:
             raise bad_value("Robot.strike.faces", faces, "give a multiple of 4, 8 at least")
         if self.period is not None and self.period < impact.duration:
@@ -207,9 +176,10 @@ class Robot:
         machine = self._machine()
         if len(found.qpos) != machine.nq or len(found.qvel) != machine.nv or not machine.made(found):
             raise bad_value("Robot.strike.swing", f"RobotSwing to {found.t_end:.6g} s", "it is of another machine")
-        scene = HandOff(self, machine, found).scene(impact, self._pairs(machine), (stiffness, mu, faces), name)
+        scene = HandOff(self, machine, found).scene(impact, self.pairs(machine), (stiffness, mu, faces), name, drawn)
         return replace(scene, fixed=(*scene.fixed, *fixed))
 
+    @warnings_logged()
     def after(self, swing: RobotSwing, scene: Scene, result: Result) -> HandBack:
         """The machine after an impact, to swing on.
 
@@ -233,27 +203,55 @@ class Robot:
         validate.kinds("Robot.after", Result, "give what mca.run made of it", result=result)
         return hand_back(self, swing, scene, result)
 
-    def mount(self, link: str, other: str | None) -> str:
-        """Node set by which a flexible link is held to another link, or to what rides on it.
+    def run(
+        self,
+        *,
+        t_end: float,
+        impact: ImpactPhase,
+        recorders: Sequence[Recorder] = (),
+        device: str = "cpu",
+        precision: str = "mixed",
+        threads: int | None = None,
+        **strike: Any,
+    ) -> RobotRun:
+        """Swing and strike in turn until a time: `swing`, `strike`, `mca.run` and `after`, again and again.
+
+        Recorders see all of it as one run, whose times count from the first touch: flexible links and the geoms that
+        MuJoCo's viewer shows, of groups 0 to 2, or all of a link that has no others. Each swing and impact has as many
+        frames as a `Cadence` says of a run.
+
+        Args:
+            t_end: of the run, from the start [s]; an impact that has begun by then is run to its end.
+            impact: each one, at whose end all contacts must be open.
+            recorders: what shows or writes the run, see `warp_mca.recorders`.
+            device, precision, threads: of the impacts, as in `mca.run`.
+            strike: further arguments of `strike`: stiffness, mu, fixed, faces, name.
 
         Raises:
-            RequestError: none was given.
+            RequestError: as in `swing` and `strike`; an output cannot be made.
+            GuardError: an impact lost its footing.
         """
-        given = self.mounts.get(link)
-        found = given.get(other) if isinstance(given, Mapping) else given
-        if not isinstance(found, str):
-            held = "what rides on it" if other is None else other
-            sets = ", ".join(sorted(self.meshes[link].node_sets))
-            remedy = f"name the node set that holds it to {held}; its mesh has {sets}"
-            raise bad_value(f"Robot.mounts[{link!r}]", given, remedy)
-        return found
+        from warp_mca.phases.arguments import check_recorders
+        from warp_mca.phases.settings import settings_of
+        from warp_mca.recorders.checks import check_files
+        from warp_mca.robots.course import run
+
+        validate.times("Robot.run", t_end=t_end)
+        validate.kinds("Robot.run", ImpactPhase, "give an ImpactPhase", impact=impact)
+        if unknown := sorted(set(strike) - {"stiffness", "mu", "fixed", "faces", "name"}):
+            raise bad_value("Robot.run", unknown[0], "give stiffness, mu, fixed, faces and name of strike, or none")
+        check_recorders(recorders)
+        check_files(recorders)
+        settings = settings_of(device, precision, threads)
+        return run(self, t_end, {"impact": impact, **strike}, settings, recorders)
 
     def _machine(self) -> Machine:
         from warp_mca.robots.machine import Machine
 
         return Machine(self)
 
-    def _pairs(self, machine: Machine) -> list[Pair]:
+    def pairs(self, machine: Machine) -> list[Pair]:
+        """Pairs of surfaces that may touch, of this robot's machine."""
         from warp_mca.robots.geoms import geom_side
         from warp_mca.robots.reading import mujoco
         from warp_mca.robots.touching import pairs_of

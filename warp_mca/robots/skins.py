@@ -11,6 +11,9 @@ from warp_mca.base.arrays import Array, Index
 from warp_mca.geometry.cell_types import is_triangle
 from warp_mca.geometry.mesh import Mesh
 
+FEW = 200  # triangles of a skin up to which they are not cut
+PIECES = 40  # of the size of a skin, the reach of the others' pieces
+
 
 class Nearest(NamedTuple):
     """Where two surfaces are nearest to each other.
@@ -54,12 +57,23 @@ class Skin:
         return normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
     @cached_property
-    def _tree(self) -> tuple[object, float]:
-        """Tree of the triangles' middles, and the greatest distance of a corner from its middle [m]."""
+    def _tree(self) -> tuple[object, Index, float]:
+        """Tree of the middles of pieces of triangles, the triangle of each, and the greatest reach of a piece [m].
+
+        Triangles of a skin with more than FEW are cut into pieces, so that large ones among them are near nothing far.
+        """
         from scipy.spatial import KDTree
 
-        middle = self.triangles.mean(axis=1)
-        return KDTree(middle), float(np.linalg.norm(self.triangles - middle[:, None], axis=2).max())
+        pieces, owner = self.triangles, np.arange(len(self.triangles), dtype=np.int32)
+        reach = lambda cut: np.linalg.norm(cut - cut.mean(axis=1)[:, None], axis=2).max(axis=1)  # noqa: E731
+        most = float(np.linalg.norm(np.ptp(self.points, axis=0))) / PIECES if len(pieces) > FEW else np.inf
+        while (large := reach(pieces) > most).any():
+            a, b, c = pieces[large].transpose(1, 0, 2)
+            ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
+            quarters = [np.stack(corners, axis=1) for corners in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
+            pieces = np.concatenate([pieces[~large], *quarters])
+            owner = np.concatenate([owner[~large], np.tile(owner[large], 4)])
+        return KDTree(pieces.mean(axis=1)), owner, float(reach(pieces).max())
 
     def nearest(self, points: Array) -> tuple[float, int, Array]:
         """Least signed distance of points from the surface [m], the number of that point and its foot.
@@ -70,16 +84,20 @@ class Skin:
         Args:
             points: [m], shape (count, 3), float64.
         """
-        tree, reach = self._tree
-        near, _ = tree.query(points)  # type: ignore[attr-defined]
+        tree, owner, reach = self._tree
         low, high = self.points.min(axis=0), self.points.max(axis=0)
-        beyond = np.linalg.norm(points - np.clip(points, low, high), axis=1)
-        least = np.maximum(beyond, near - reach)
+        least = np.linalg.norm(points - np.clip(points, low, high), axis=1)
+        first = int(least.argmin())
+        within = np.flatnonzero(least <= tree.query(points[first])[0] + reach)  # type: ignore[attr-defined]
+        near = np.full(len(points), np.inf)
+        near[within], _ = tree.query(points[within])  # type: ignore[attr-defined]
+        least[within] = np.maximum(least[within], near[within] - reach)
         best, which, foot = np.inf, 0, points[0]
-        for k in np.argsort(least, kind="stable"):
+        for k in within[np.argsort(least[within], kind="stable")]:
             if least[k] > best:
                 break
-            candidates = tree.query_ball_point(points[k], near[k] + reach * (1.0 + 1e-9))  # type: ignore[attr-defined]
+            pieces = tree.query_ball_point(points[k], near[k] + reach * (1.0 + 1e-9))  # type: ignore[attr-defined]
+            candidates = np.unique(owner[pieces])
             feet = closest_points(points[k], self.triangles[candidates])
             away = points[k] - feet
             distance = np.linalg.norm(away, axis=1)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from warp_mca.robots.robot import Robot
 
 FAR = 1e3  # beyond which distances are not told apart [m]
+BEYOND = 0.1  # of the machine's extent, twice the way in a step: farther geoms have the distance of their hulls
 
 
 class Pose(NamedTuple):
@@ -103,6 +104,11 @@ class Pair:
         first, second = self.first.pose(data, t), self.second.pose(data, t)
         if self.second.plane is not None:
             return self._over_plane(first, self.second.plane)
+        if self.first.geom is not None and self.second.geom is not None:
+            ends, model = np.zeros(6), self._machine.model
+            apart = float(self._mj.mj_geomDistance(model, data, self.first.geom, self.second.geom, FAR, ends))
+            if apart > BEYOND * float(model.stat.extent):
+                return Nearest(apart, ends[:3], ends[3:])
         return min(
             _one_way(self.first, first, self.second, second),
             _swapped(_one_way(self.second, second, self.first, first)),

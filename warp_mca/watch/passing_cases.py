@@ -197,10 +197,13 @@ def cases_of(scene: Scene, meshes: Mapping[str, Mesh], model: Model, skins: Sequ
             yield BelowPlane((skin,), own, kept_out, plane)
     bound = _bound_nodes(scene, meshes, model)
     whole = {frozenset((joint.body, joint.other)) for joint in scene.joints if joint.whole()}
+    links = frozenset().union(*whole) | {item.body for item in scene.fixed}
+    given = {body.name for body in scene.bodies if body.mass is not None}
     for numbers in combinations(range(len(skins)), 2):
         one, other = (skins[k] for k in numbers)
         names = frozenset((one.name, other.name))
-        if names in whole:  # links overlap at their joint
+        # links overlap at their joint, and elsewhere if one's mass is not that of its shape and no contact is asked for
+        if names in whole or (names <= links and names & given and names not in passes):
             continue
         edges = _free_edges(one, other, [model.X[nodes] for nodes in bound.get(names, ())])
         yield WithinBody((one, other), passes.get(names, ()), numbers, edges)
