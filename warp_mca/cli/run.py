@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> None:
     if robot_script.is_robot(args.scene):
         robot_script.print_script(args.scene)
         return
-    if part_script.is_part(args.scene):
+    if part_script.is_part(args.scene) and args.units is None:
         part_script.print_script(args.scene)
         return
     logging.getLogger(LOGGER).setLevel(logging.INFO)  # so that what is about to run is said

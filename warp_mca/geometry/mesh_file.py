@@ -83,7 +83,14 @@ class MeshFile:
         Raises:
             RequestError: it cannot be read, or holds something other than sound hexahedra.
         """
-        read, notes = self._read()
+        return with_selections(self.converted(*self._read()), self.select)
+
+    def converted(self, read: meshio.Mesh, notes: list[str]) -> Mesh:
+        """What a reader gave as a mesh, with sentences about what is left out, which are told.
+
+        Raises:
+            RequestError: it holds something other than sound cells.
+        """
         points = self.scale * np.array(read.points, dtype=np.float64)
         if points.ndim != 2 or points.shape[1] != 3:
             raise self._bad("its points are not three-dimensional; save it with x, y and z")
@@ -115,8 +122,7 @@ class MeshFile:
                 )
         for note in notes:
             logging.getLogger("warp_mca").warning("%s", note)
-        mesh = compact(Mesh(points, node_sets=node_sets, cell_sets=cell_sets, notes=tuple(notes), **arrays))
-        return with_selections(mesh, self.select)
+        return compact(Mesh(points, node_sets=node_sets, cell_sets=cell_sets, notes=tuple(notes), **arrays))
 
     def _read(self) -> tuple[meshio.Mesh, list[str]]:
         """The file's mesh with cells of known types, and sentences about what is left out."""
