@@ -64,7 +64,7 @@ def test_parameters_and_long_fields(tmp_path: Path):
     """A set from a formula, nodes in fields of 20 columns, numbers of solids in ten."""
     text = deck("columns")
     nodes = "".join(f"{n:20d}{x:20.9e}{y:20.9e}{z:20.9e}\n" for n, (x, y, z) in POINTS.items())
-    start, end = text.index("*NODE"), text.index("*ELEMENT_SOLID")
+    start = text.index("*NODE")
     cells = "".join("".join(f"{n:10d}" for n in (k, part, *own)) + "\n" for k, (part, own) in SOLIDS.items() if k != 2)
     rest = text[text.index("*PART") :].replace("        11        14\n", "      &low     &high\n")
     formula = "*PARAMETER\nI      low        11\n*PARAMETER_EXPRESSION\nI     high  low + sqrt(9)\n"
