@@ -22,7 +22,7 @@ from warp_mca.scene.tied_surfaces import Tie
 SIDES = "ssid msid sstyp mstyp sboxid mboxid spr mpr"
 FRICTION = "fs fd dc vc vdc penchk bt dt"
 SCALES = "sfs sfm sst mst sfst sfmt fsf vsf"
-WALL = 10.0  # penalty of rigid walls, which stop nodes at once in LS-DYNA
+WALL = 10.0  # penalty of rigid walls, which stop nodes at once in LS-DYNA: by default, nodes of Taylor's bar sink in
 _NAMES = {0: "segments", 4: "nodes"}  # of node sets by the type of a side
 NEAR = 0.05  # distance of nodes that are tied, as a share of the edge of the face [-]
 

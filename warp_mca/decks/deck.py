@@ -39,9 +39,24 @@ FLATTEST = 0.05  # share of the stable step below which the estimate does not go
 def read_deck(path: str | Path, units: str, leave_out: Sequence[str] = ()) -> Scene:
     """A scene from an LS-DYNA keyword deck and the files that it includes, in SI units.
 
-    Parts with solids become bodies, parts that share nodes one body; docs/parts.md lists what is read. A keyword that
-    is not understood is refused with its line, unless it is known to change no result. What is taken otherwise than
-    LS-DYNA does is said in a warning, which the run keeps.
+    A keyword that is not understood is refused with its line, unless it is known to change no result, as *DATABASE_...
+    What is taken otherwise than LS-DYNA does is said in a warning, which the run keeps. What is read:
+
+    - *PART, *SECTION_SOLID: a body, one for parts that share nodes, with finite strain. ELFORM 1 is hex8r, 2 hex8,
+      -1, -2 and 18 hex8i; tetrahedra are tet4 or tet10, wedges wedge6 where the element allows.
+    - *MAT_ELASTIC, *MAT_PLASTIC_KINEMATIC (any beta; with rates 1), *MAT_RIGID (constraints along the world's axes),
+      *MAT_PIECEWISE_LINEAR_PLASTICITY (points or a curve), *MAT_JOHNSON_COOK, with *EOS_LINEAR_POLYNOMIAL of C1 alone:
+      the same laws, with failure by strain. Rates are those of plastic strain.
+    - *INITIAL_VELOCITY, _NODE, _GENERATION, _RIGID_BODY: a rigid motion of each body.
+    - *BOUNDARY_SPC_NODE, _SET, codes of *NODE: `Fixed` along axes of the world.
+    - *CONTACT_AUTOMATIC_SINGLE_SURFACE: `ContactAll`; _SURFACE_TO_SURFACE, _NODES_TO_SURFACE, also ONE_WAY: `Contact`,
+      with the springs of this program; *CONTACT_TIED_...: `Tie` of the faces that meet.
+    - *RIGIDWALL_PLANAR: `RigidPlane` for the nodes that it names, with penalty 10. *LOAD_BODY_X, _Y, _Z: gravity, or
+      `BodyForce` where its curve changes.
+    - *CONTROL_TERMINATION, *CONTROL_TIMESTEP (TSSFAC, DT2MS), *CONTROL_BULK_VISCOSITY, by default 0.06 and 1.5:
+      `ImpactPhase`. The step does not follow cells that flatten, see `flattening`.
+    - *INCLUDE, *INCLUDE_PATH, *PARAMETER, *PARAMETER_EXPRESSION; *SET_NODE (list, range, box, part), *SET_PART,
+      *SET_SEGMENT; *DEFINE_BOX, *DEFINE_COORDINATE_SYSTEM, _NODES, _VECTOR, *DEFINE_CURVE.
 
     Args:
         path: of the deck.
