@@ -186,6 +186,23 @@ def test_the_deck_runs_as_the_scene(tmp_path: Path, capsys: pytest.CaptureFixtur
     np.testing.assert_array_equal(mca.load(out).F_n, wanted.F_n)
 
 
+def test_units_belong_to_decks(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    from warp_mca.cli.main import main
+
+    (tmp_path / "it.k").write_text(deck("columns"))
+    for words, error in (
+        (
+            ["two_link", "--units", "SI"],
+            "--units = 'SI': it gives those of a keyword deck (.k, .key, .dyn); leave it out",
+        ),
+        ([str(tmp_path / "it.k"), "--units", "SI", "--set", "mu=0.1"], "--set = 'mu': a deck has no parameters"),
+    ):
+        assert main(["run", *words]) == 2
+        assert error in capsys.readouterr().err
+    assert main(["run", str(tmp_path / "it.k")]) == 0
+    assert "--units t-mm-s, or others, runs the deck's own materials" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("more", "words"),
     [

@@ -138,10 +138,6 @@ class Content:
         """First card of the last keyword of a kind, or None."""
         return self.card(self.found[kind][-1], 0, names) if self.found[kind] else None
 
-    def title(self, item: Keyword) -> str:
-        """The title of a keyword, or ""."""
-        return item.lines[0][1].strip() if item.titled and item.lines else ""
-
 
 def _listed(places: dict[str, str]) -> str:
     """Keywords with the places where they stand first, and the verb."""
