@@ -19,9 +19,9 @@ class Placing:
     """x -> R (x + shift - point) + point.
 
     Attributes:
-        shift: in the file's unit, shape (3,).
-        turn: R, shape (3, 3), or None for none.
-        point: of the axis, likewise.
+        shift: in the file's unit, shape (3,), float64.
+        turn: R, shape (3, 3), float64, or None for none.
+        point: of the axis, in the file's unit, shape (3,), float64.
     """
 
     shift: Array
