@@ -108,6 +108,29 @@ def test_a_part_and_its_assembly(read):
     assert mesh.cell_sets["top"].tolist() == [1]
 
 
+def test_instances_stand_where_the_assembly_puts_them(read, tmp_path: Path):
+    """Two bars, the second moved by 10 along x, then turned by 90 degrees about the line x = 10 along z, and a cube."""
+    cube = f"*Part, name=Cube\n*NODE\n{NODES}*ELEMENT, TYPE=C3D8\n{LOW}*End Part\n"
+    moved = "*Instance, name=Bar-2, part=BAR\n10.\n10., 0., 0., 10., 0., 1., 90.\n*End Instance\n"
+    more = f"{moved}*Instance, name=Cube-1, part=Cube\n0., 0., 5.\n*End Instance\n"
+    sets = "*Nset, nset=tops, instance=Bar-2\n9, 10\n*Nset, nset=ends\nBar-1.Set-1, Cube-1.8\n*Nset, nset=few\nends\n"
+    mesh, notes = read(cube + part(assembly=more + sets))
+    assert not notes and volumes(mesh) == pytest.approx([1.0] * 5)
+    assert {name: len(cells) for name, cells in mesh.cell_sets.items() if "-" in name[-2:]} == {
+        **{"Bar-1": 2, "Bar-2": 2, "Cube-1": 1}
+    }
+    assert mesh.points[mesh.nodes("tops")] == pytest.approx(np.array([[10.0, 0.0, 2.0], [10.0, 1.0, 2.0]]))
+    assert mesh.points[mesh.nodes("Bar-2.Set-1")] == pytest.approx(np.array([[10.0, 0.0, 0.0], [10.0, 1.0, 0.0]]))
+    assert heights(mesh, "ends") == heights(mesh, "few") == [0.0, 0.0, 6.0]
+    one = mca.MeshFile(tmp_path / "it.inp", only="Bar-2").build()
+    assert one.points.min(axis=0) == pytest.approx([9.0, 0.0, 0.0])
+    assert one.points.max(axis=0) == pytest.approx([10.0, 1.0, 2.0])
+    assert (len(one.points), one.cell_count, len(one.nodes("tops")), len(one.node_sets["ends"])) == (12, 2, 2, 0)
+    assert one.cell_sets["Bar-2"].tolist() == [0, 1] and "Cube-1" not in one.cell_sets
+    with pytest.raises(mca.RequestError, match=r"cell set = 'Bar-3': the mesh has .*Bar-1"):
+        mca.MeshFile(tmp_path / "it.inp", only="Bar-3").build()
+
+
 LEFT_OUT = [
     ("*ELEMENT, TYPE=S4, ELSET=s\n3, 1,2,4,3\n*ELEMENT, TYPE=B31\n4, 1,2\n5, 2,4\n", "1 S4, 2 B31"),
     ("*ELEMENT, TYPE=MASS, ELSET=m\n3, 1\n*MASS, ELSET=m\n0.2\n", "1 MASS"),
@@ -190,13 +213,14 @@ def test_what_would_change_the_mesh_is_refused(read, lines: str, words: str):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        (part(transform="0.1, 0., 0.\n"), "INSTANCE that is moved"),
-        (part(transform="0., 0., 0.\n0., 0., 0., 0., 0., 1., 30.\n"), "INSTANCE that is moved"),
-        (part(assembly="*Instance, name=Bar-2, part=Bar\n*End Instance\n"), r"second \*INSTANCE"),
-        (part() + "*Part, name=b\n*End Part\n", r"second \*PART"),
+        (part(transform="0., 0.\n0., 0., 0., 0., 0., 1.\n"), "INSTANCE takes a translation and, in a second line"),
+        (part(transform="0.\n1., 0., 0., 1., 0., 0., 30.\n"), "two points of the axis of an .INSTANCE are one"),
+        (part(assembly="*Instance, name=BAR-1, part=Bar\n*End Instance\n"), "instance BAR-1 is given twice"),
+        (part(assembly="*Instance, name=b, part=Rod\n*End Instance\n"), r"no \*PART Rod for instance b"),
+        (part() + f"*Part, name=bar\n{MESH}*End Part\n", "part bar is given twice"),
         (part(assembly="*Nset, nset=n, instance=Rod-1\n1\n"), r"no \*INSTANCE Rod-1"),
     ],
 )
-def test_several_or_moved_parts_are_refused(read, text: str, words: str):
+def test_parts_that_cannot_be_placed_are_refused(read, text: str, words: str):
     with pytest.raises(mca.RequestError, match=words):
         read(text)

@@ -60,6 +60,20 @@ def columns(nodes: list[int], two_cards: bool) -> str:
     return head + ("\n" if two_cards else "") + "".join(f"{n:8d}" for n in nodes[2:]) + "\n"
 
 
+def test_parameters_and_long_fields(tmp_path: Path):
+    """A set from a formula, nodes in fields of 20 columns, numbers of solids in ten."""
+    text = deck("columns")
+    nodes = "".join(f"{n:20d}{x:20.9e}{y:20.9e}{z:20.9e}\n" for n, (x, y, z) in POINTS.items())
+    start = text.index("*NODE")
+    cells = "".join("".join(f"{n:10d}" for n in (k, part, *own)) + "\n" for k, (part, own) in SOLIDS.items() if k != 2)
+    rest = text[text.index("*PART") :].replace("        11        14\n", "      &low     &high\n")
+    formula = "*PARAMETER\nI      low        11\n*PARAMETER_EXPRESSION\nI     high  low + sqrt(9)\n"
+    (tmp_path / "it.k").write_text(f"{text[:start]}*NODE+\n{nodes}*ELEMENT_SOLID%\n{cells}{formula}{rest}")
+    mesh = mca.MeshFile(tmp_path / "it.k").build()
+    assert sorted(volumes(mesh)) == pytest.approx([1 / 6, 1 / 3, 1])
+    assert {tuple(mesh.points[n].tolist()) for n in mesh.nodes("set_5")} == {POINTS[n] for n in range(11, 15)}
+
+
 def deck(layout: str) -> str:
     """The parts in one of the layouts of cards."""
     solids = {**SOLIDS, 2: (2, WEDGE)}
@@ -137,9 +151,11 @@ def test_sets_of_segments_columns_and_solids(tmp_path: Path):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("*TITLE", "*INCLUDE", "line 3: .INCLUDE is not read: it puts another file in"),
+        ("*TITLE", "*INCLUDE", "line 4: there is no file parts, which .INCLUDE names"),
         ("*TITLE", "*INCLUDE_TRANSFORM", "INCLUDE_TRANSFORM is not read"),
-        ("*TITLE", "*PARAMETER", "PARAMETER is not read"),
+        ("*TITLE\nparts", "*PARAMETER\nx,1", "line 4: parameter 'x' has no type; begin its name with R, I or C"),
+        ("        11        14\n", "      &low        14\n", "there is no parameter low; give it before it is used"),
+        ("*TITLE\nparts", "*PARAMETER_EXPRESSION\nR x       open(1)", "the formula 'open.1.' is not read"),
         ("*TITLE", "*PART_MOVE", "PART_MOVE is not read: it moves nodes"),
         ("*TITLE", "*NODE_TRANSFORM", "NODE_TRANSFORM is not read"),
         ("*TITLE", "*DEFINE_TRANSFORMATION", "DEFINE_TRANSFORMATION is not read"),
@@ -148,8 +164,6 @@ def test_sets_of_segments_columns_and_solids(tmp_path: Path):
         ("*PART\n", "*ELEMENT_SOLID\n7,1,1,2,11,41\n*PART\n", "element 7 is given twice"),
         ("*PART\n", f"*ELEMENT_SOLID\n8,1,{WEDGE18}*PART\n", "a solid with 18 nodes is of no known type"),
         ("*ELEMENT_SOLID", "*ELEMENT_SOLID_ORTHO", "ELEMENT_SOLID_ORTHO is not read"),
-        ("*KEYWORD", "*KEYWORD LONG=Y", "long fields"),
-        ("*NODE\n", "*NODE+\n", "long fields"),
         ("      31      31\n", "      31      14\n", "is of no known type"),
         ("       1       2       3       4", "       1       2       3       8", "has node 8, which is not given"),
         ("       1       2       3       4", "       1       2       x       4", "line 20: 'x' is no whole number"),

@@ -76,6 +76,7 @@ if TYPE_CHECKING:
     from warp_mca.accuracy.request import Accuracy
     from warp_mca.accuracy.simulation import mesh, run
     from warp_mca.accuracy.tradeoff import tradeoff
+    from warp_mca.decks.deck import read_deck
     from warp_mca.geometry import Box, Cad, LugRod, Mesh, MeshFile, NestedPlate, Part, Parts, Plate, Rod, Select, Sphere
     from warp_mca.phases.quality import quality_table
     from warp_mca.registration import register
@@ -116,6 +117,7 @@ _LAZY = {
     "cfc_filter": "warp_mca.results.cfc",
     "load": "warp_mca.results.storage",
     "tradeoff": "warp_mca.accuracy.tradeoff",
+    "read_deck": "warp_mca.decks.deck",
     "quality_table": "warp_mca.phases.quality",
     "mesh": "warp_mca.accuracy.simulation",
     "run": "warp_mca.accuracy.simulation",
@@ -209,6 +211,7 @@ __all__ = [
     "make_scene",
     "mesh",
     "quality_table",
+    "read_deck",
     "register",
     "run",
     "run_batch",

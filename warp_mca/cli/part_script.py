@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from warp_mca.base.errors import RequestError, bad_value
+from warp_mca.geometry.keyword_file import KEYWORD_SUFFIXES
 
 MESH_SUFFIXES = (".msh", ".unv", ".bdf", ".nas", ".fem", ".inp", ".k", ".key", ".dyn", ".vtu", ".vtk", ".med")
 SHOWN = 12  # node sets, solids and pairs of them that the script lists
@@ -154,9 +155,11 @@ def print_script(name: str) -> None:
     """
     print(part_script(name), end="")
     script = f"{Path(name).stem}_drop.py"
+    deck = Path(name).suffix.lower() in KEYWORD_SUFFIXES
     print(
         f"{Path(name).name} is a part, not a scene: the script on standard output drops it on a floor; save it with "
-        f"'warp-mca run {name} > {script}', then run it with 'warp-mca run {script}'",
+        f"'warp-mca run {name} > {script}', then run it with 'warp-mca run {script}'"
+        + ("; --units t-mm-s, or others, runs the deck's own materials, speeds and contacts" if deck else ""),
         file=sys.stderr,
     )
 

@@ -12,6 +12,7 @@ import warp_mca as mca
 from warp_mca.base.errors import bad_value
 from warp_mca.base.outside import import_named
 from warp_mca.cli import part_script, robot_script
+from warp_mca.geometry.keyword_file import KEYWORD_SUFFIXES
 from warp_mca.scene import Scene, catalogue, model_file
 from warp_mca.scene.elements import ELEMENTS
 from warp_mca.scene.model_file import SUFFIX, Origin
@@ -49,16 +50,21 @@ def read_requests(args: argparse.Namespace, settings: Sequence[Mapping[str, str]
     """Build the scenes that the arguments ask for, each with some parameters changed; their file is read once."""
     if robot_script.is_robot(args.scene):
         raise robot_script.no_scene(args.scene)
-    drop = part_script.is_drop(args)
+    units, drop = getattr(args, "units", None), part_script.is_drop(args)
     if drop:
         part_script.check_drop(args)
-    elif part_script.is_part(args.scene):
+    elif part_script.is_part(args.scene) and units is None:
         raise part_script.no_scene(args.scene)
+    if units is not None and Path(args.scene).suffix.lower() not in KEYWORD_SUFFIXES:
+        remedy = f"it gives those of a keyword deck ({', '.join(KEYWORD_SUFFIXES)}); leave it out"
+        raise bad_value("--units", units, remedy)
     for name in args.imports:
         import_named("--import", name)
     if drop:
         source = catalogue.source_of_text(part_script.part_script(args.scene), f"{Path(args.scene).stem}-drop")
         return [_of_source(args, source, more) for more in settings]
+    if units is not None:
+        return [_of_deck(args, units, more) for more in settings]
     if Path(args.scene).suffix != SUFFIX:
         source = catalogue.load_source(args.scene)
         return [_of_source(args, source, more) for more in settings]
@@ -78,6 +84,18 @@ def _of_source(args: argparse.Namespace, source: catalogue.SceneSource, more: Ma
     origin = Origin(source.name, preset, values) if source.builtin else None
     label = f"{source.name}-{preset}" if preset else source.name
     return Request(_with(source.build(values), args, scale), label, source, origin)
+
+
+def _of_deck(args: argparse.Namespace, units: str, more: Mapping[str, str]) -> Request:
+    from warp_mca.decks.deck import read_deck
+
+    if args.preset is not None:
+        raise bad_value("--preset", args.preset, "a deck has none; leave it out")
+    if overrides := _overrides(args, more):
+        remedy = "a deck has no parameters; change the deck, or make a scene of it by mca.read_deck"
+        raise bad_value("--set", next(iter(overrides)), remedy)
+    scene = _with(read_deck(args.scene, units), args, getattr(args, SCALE, None))
+    return Request(scene, Path(args.scene).stem)
 
 
 def _of_model(args: argparse.Namespace, stored: model_file.StoredModel, more: Mapping[str, str]) -> Request:

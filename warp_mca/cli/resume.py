@@ -16,6 +16,7 @@ from typing import Any
 
 from warp_mca.base.errors import bad_value
 from warp_mca.base.outside import file_of, import_named
+from warp_mca.geometry.keyword_file import KEYWORD_SUFFIXES
 from warp_mca.phases.checkpoint import FILE, stored_command
 from warp_mca.scene.catalogue import SUFFIX as PYTHON
 from warp_mca.scene.catalogue import scene_names
@@ -24,6 +25,7 @@ from warp_mca.scene.model_file import SUFFIX as MODEL
 # Options of `run` that a state may have, by the names that argparse gives them, and what they may be.
 OPTIONS: dict[str, tuple[type, ...]] = {
     "preset": (str,),
+    "units": (str,),
     "refine": (float,),
     "element": (str,),
     "set": (list,),
@@ -153,7 +155,7 @@ def _is_word(item: object) -> bool:
 
 
 def _is_file(name: str | Path) -> bool:
-    return Path(name).suffix in (PYTHON, MODEL)
+    return Path(name).suffix in (PYTHON, MODEL) or Path(name).suffix.lower() in KEYWORD_SUFFIXES
 
 
 def _digest(path: Path) -> str:

@@ -1,4 +1,4 @@
-"""Owns the reading of Abaqus and CalculiX input files: nodes, solids and sets of one part."""
+"""Owns the reading of Abaqus and CalculiX input files: nodes, solids and sets, of parts where instances place them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from warp_mca.geometry.abaqus_sets import Key, NamedSet, SetTable
+from warp_mca.geometry.abaqus_placing import UNMOVED, Placing
+from warp_mca.geometry.abaqus_sets import ASSEMBLY, Key, NamedSet, SetTable
 from warp_mca.geometry.deck import Block, Deck, blocks, integer, real
 from warp_mca.geometry.deck_rules import ABAQUS_RULES, OTHER
 
@@ -34,6 +35,7 @@ _QUADRATIC_LINES = re.compile(r"(?:T3D|T2D|DC1D)3|B[23]2")
 _CORNERS = {3: 3, 4: 4, 6: 3, 8: 4, 9: 4}  # of faces, by their nodes
 _MARKS = re.compile(r"CP[SE]\d.*|T3D\d LINE\d+")  # plane elements and trusses with their set, as gmsh marks places
 _LONGEST = 16  # numbers in a line
+STRIDE = 10**12  # between the numbers that an instance's nodes and elements get and those of the next one
 _FLAGS = {"GENERATE", "INTERNAL", "UNSORTED"}
 Parameters = dict[str, str]
 Data = list[tuple[int, str]]
@@ -42,7 +44,8 @@ Data = list[tuple[int, str]]
 def read_abaqus(path: Path) -> tuple[meshio.Mesh, list[str]]:
     """The solids of an input file with its sets, and sentences about what is left out.
 
-    Sets may hold sets that are defined later. A set of shells, beams and other elements is one of their corners.
+    Each instance of a part is read anew, in its place; of several, each is a set of cells, too. Sets may hold sets that
+    are defined later. A set of shells, beams and other elements is one of their corners.
 
     Raises:
         ValueError: a line cannot be read, or a keyword would change the mesh in a way that is not read.
@@ -90,18 +93,28 @@ def _shape(name: str) -> tuple[int, int]:
 
 
 class _Reader:
-    """Takes the blocks of a file in turn. Numbers of an assembly's own nodes and elements are kept negative."""
+    """Takes the blocks of a file in turn. Numbers of an assembly's own nodes and elements are kept negative.
+
+    A part is read where an instance puts it, or at the end of a file without instances.
+    """
 
     def __init__(self, deck: Deck) -> None:
         self.deck, self.line = deck, 0
         self.sets = SetTable()
-        self.part = self.instance = ""
-        self.in_assembly = self.in_step = False
+        self.parts: dict[str, list[Block]] = {}
+        self.part: str | None = None  # that is being kept
+        self.instances: list[str] = []
+        self.placing = UNMOVED
+        self.scope = 0  # as in `abaqus_sets`
+        self.in_step = False
 
     def take(self, block: Block) -> None:
-        """Read one block, or count it."""
+        """Read one block, or keep it for the instances of its part, or count it."""
         self.line = block.line
         keyword, parameters = _parameters(block.keyword)
+        if self.part is not None and keyword != "ENDPART":
+            self.parts[self.part].append(block)
+            return
         for name in parameters.keys() - _PARAMETERS.get(keyword, parameters.keys()):
             if name in _REFUSED_PARAMETERS:
                 raise ValueError(f"*{keyword} with the parameter {name} is not read")
@@ -116,23 +129,35 @@ class _Reader:
             self.deck.left[kind, f"*{keyword}"] += 1
 
     def _take_part(self, keyword: str, parameters: Parameters, data: Data) -> None:
-        if keyword == "PART":
-            if self.part:
-                raise ValueError("a second *PART is not read")
-            self.part = parameters.get("NAME", "part")
+        self.part = parameters.get("NAME", "part").upper() if keyword == "PART" else None
+        if self.part is not None and self.parts.setdefault(self.part, []):
+            raise ValueError(f"part {parameters.get('NAME', 'part')} is given twice")
 
     def _take_assembly(self, keyword: str, parameters: Parameters, data: Data) -> None:
-        self.in_assembly = keyword == "ASSEMBLY"
+        self.scope = ASSEMBLY if keyword == "ASSEMBLY" else 0
 
     def _take_instance(self, keyword: str, parameters: Parameters, data: Data) -> None:
-        self.in_assembly = keyword == "ENDINSTANCE"
+        self.scope, self.placing = ASSEMBLY, UNMOVED
         if keyword == "INSTANCE":
-            if self.instance:
-                raise ValueError("a second *INSTANCE is not read")
-            self.instance = parameters.get("NAME", "instance")
-            rows = [[real(entry) for entry in _fields(text)] for _, text in data]
-            if any(rows[:1] and rows[0]) or any(len(row) > 6 and row[6] for row in rows[1:]):
-                raise ValueError("an *INSTANCE that is moved is not read")
+            name, part = parameters.get("NAME", "instance"), parameters.get("PART", "part").upper()
+            if self._instance(name) is not None:
+                raise ValueError(f"instance {name} is given twice")
+            if part not in self.parts:
+                raise ValueError(f"there is no *PART {parameters.get('PART', 'part')} for instance {name}")
+            self.instances.append(name)
+            self.placing = Placing.of([[real(entry) for entry in _fields(text)] for _, text in data])
+            self._read_part(part, len(self.instances) - 1)
+
+    def _read_part(self, part: str, scope: int) -> None:
+        """Read the blocks of a part as those of an instance."""
+        self.scope, line = scope, self.line
+        for block in self.parts[part]:
+            self.take(block)
+        self.line = line
+
+    def _instance(self, name: str) -> int | None:
+        """The scope of an instance, or None where there is none of that name."""
+        return next((k for k, own in enumerate(self.instances) if own.upper() == name.upper()), None)
 
     def _take_step(self, keyword: str, parameters: Parameters, data: Data) -> None:
         self.in_step = keyword == "STEP"
@@ -150,11 +175,13 @@ class _Reader:
         for self.line, text in data:
             number, *place = _fields(text)
             x, y, z = (real(entry) for entry in (*place[:3], "", "", "")[:3])
-            self.deck.add_node(self._own(integer(number)), (x, y, z))
+            self.deck.add_node(self._own(integer(number)), self.placing.place(x, y, z))
             members.append(self._own(integer(number)))
 
-    def _own(self, number: int) -> int:
-        return -number if self.in_assembly else number
+    def _own(self, number: int, scope: int | None = None) -> int:
+        """The number that a node or an element of a scope, by default the present one, has in the deck."""
+        scope = self.scope if scope is None else scope
+        return -number if scope == ASSEMBLY else number + STRIDE * scope
 
     def _take_element(self, keyword: str, parameters: Parameters, data: Data) -> None:
         if "TYPE" not in parameters:
@@ -206,44 +233,58 @@ class _Reader:
     def _take_nset(self, keyword: str, parameters: Parameters, data: Data) -> None:
         item = self._take_members(self.sets.nodes, keyword, parameters, data)
         if parameters.get("ELSET"):
-            item.elsets.append((self._is_own(parameters), parameters["ELSET"].upper()))
+            item.elsets.append((self._scope_of(parameters), parameters["ELSET"].upper()))
 
     def _take_elset(self, keyword: str, parameters: Parameters, data: Data) -> None:
         self._take_members(self.sets.elements, keyword, parameters, data)
 
-    def _is_own(self, parameters: Parameters) -> bool:
-        """Whether numbers of a set count the assembly's own nodes, not those of its instance."""
-        if self.instance and parameters.get("INSTANCE", self.instance).upper() != self.instance.upper():
+    def _scope_of(self, parameters: Parameters) -> int:
+        """Scope of the numbers of a set."""
+        if "INSTANCE" not in parameters or not self.instances:
+            return self.scope
+        if (found := self._instance(parameters["INSTANCE"])) is None:
             raise ValueError(f"there is no *INSTANCE {parameters['INSTANCE']}")
-        return self.in_assembly and "INSTANCE" not in parameters
+        return found
 
     def _take_members(self, sets: dict[Key, NamedSet], keyword: str, parameters: Parameters, data: Data) -> NamedSet:
-        item, own = self._set(sets, parameters, keyword), self._is_own(parameters)
+        item, scope = self._set(sets, parameters, keyword), self._scope_of(parameters)
         for self.line, text in data:
             fields = _fields(text)
             if "GENERATE" in parameters and fields:
                 fields = fields * 2 if len(fields) == 1 else fields
                 first, last, step = map(integer, (*fields, "1")[:3])
                 step = max(step, 1)
-                item.ranges.append(range(-first, -last - 1, -step) if own else range(first, last + 1, step))
+                step = -step if scope == ASSEMBLY else step
+                first, last = self._own(first, scope), self._own(last, scope)
+                item.ranges.append(range(first, last + (1 if step > 0 else -1), step))
                 continue
             for entry in filter(None, fields):
                 instance, _, inner = entry.partition(".")
-                of_instance = bool(self.instance and inner) and instance.upper() == self.instance.upper()
-                name = inner if of_instance else entry
+                found = self._instance(instance) if inner else None
+                name, where = (entry, scope) if found is None else (inner, found)
                 if name.isdigit():
-                    item.numbers.append(-int(name) if own and not of_instance else int(name))
+                    item.numbers.append(self._own(int(name), where))
                 else:
-                    item.sets.append((own and not of_instance, name.strip('"').upper()))
+                    item.sets.append((where, name.strip('"').upper()))
         return item
 
     def _set(self, sets: dict[Key, NamedSet], parameters: Parameters, keyword: str) -> NamedSet:
         """The set that a parameter names."""
         if not (name := parameters.get(keyword)):
             raise ValueError(f"{keyword} lacks a name")
-        return sets.setdefault((self.in_assembly, name.upper()), NamedSet(name))
+        return sets.setdefault((self.scope, name.upper()), NamedSet(name))
 
     def finish(self) -> tuple[meshio.Mesh, list[str]]:
         """The mesh, and sentences about what is left out."""
-        self.sets.close(self.deck, self.instance)
+        try:
+            if not self.instances:
+                for k, part in enumerate(self.parts):
+                    self.instances.append(part)
+                    self._read_part(part, k)
+        except ValueError as error:
+            raise ValueError(f"line {self.line}: {error}") from error
+        self.sets.close(self.deck, self.instances)
+        for k, name in enumerate(self.instances if len(self.instances) > 1 else ()):
+            own = [number for number in self.deck.cells if number > 0 and number // STRIDE == k]
+            self.deck.cell_sets.setdefault(name, own)
         return self.deck.mesh()

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from warp_mca.geometry.deck import Deck
 
-Key = tuple[bool, str]  # whether a set is the assembly's own, and its name in capitals
+ASSEMBLY = -1  # scope of what is the assembly's own; that of the instances is 0, 1, …, and 0 in a file without
+Key = tuple[int, str]  # scope of a set, and its name in capitals
 
 
 @dataclass
@@ -35,10 +37,10 @@ class SetTable:
         self.nodes: dict[Key, NamedSet] = {}
         self.elements: dict[Key, NamedSet] = {}
 
-    def close(self, deck: Deck, instance: str) -> None:
+    def close(self, deck: Deck, instances: Sequence[str]) -> None:
         """Give the deck all sets with their members, in any order of definition.
 
-        Of two sets of one name in a part and in the assembly, that of the part is called "instance.name".
+        Sets of several instances are called "instance.name", as is that of one where the assembly has one of its name.
 
         Raises:
             ValueError: a set holds one that is not given, or itself.
@@ -46,8 +48,9 @@ class SetTable:
         for kept, sets in ((deck.cell_sets, self.elements), (deck.node_sets, self.nodes)):
             known: dict[tuple[int, Key], list[int] | None] = {}
             for key, item in sets.items():
-                inner = not key[0] and (True, key[1]) in sets
-                kept[f"{instance}.{item.name}" if inner else item.name] = self._members(deck, sets, key, known)
+                inner = key[0] != ASSEMBLY and (len(instances) > 1 or (ASSEMBLY, key[1]) in sets)
+                name = f"{instances[key[0]] if instances else ''}.{item.name}" if inner else item.name
+                kept[name] = self._members(deck, sets, key, known)
 
     def _members(
         self, deck: Deck, sets: dict[Key, NamedSet], key: Key, known: dict[tuple[int, Key], list[int] | None]
@@ -85,6 +88,9 @@ class SetTable:
 
 
 def _find(reference: Key, sets: dict[Key, NamedSet]) -> Key | None:
-    """The set that is meant: the one of that table, else of the other."""
-    own, name = reference
-    return next((key for key in ((own, name), (not own, name)) if key in sets), None)
+    """The set that is meant: the one of that scope, else the assembly's, else that of the one instance that has it."""
+    scope, name = reference
+    if found := next((key for key in ((scope, name), (ASSEMBLY, name)) if key in sets), None):
+        return found
+    others = [key for key in sets if key[1] == name and scope == ASSEMBLY]
+    return others[0] if len(others) == 1 else None

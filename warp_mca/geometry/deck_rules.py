@@ -142,8 +142,8 @@ NASTRAN_RULES = Rules(
 )
 KEYWORD_RULES = Rules(
     refused={
-        "INCLUDE*": _PUTS_IN,
-        "PARAMETER*": "it puts other numbers in",
+        "INCLUDE_*": _PUTS_IN,
+        "PARAMETER_TYPE": "it puts other numbers in",
         "CASE*": "it chooses keywords",
         "DEFINE_TRANSFORMATION*": _MOVES,
         "NODE_TRANSFORM*": _MOVES,

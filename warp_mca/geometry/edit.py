@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warp_mca.base.errors import bad_value
-from warp_mca.geometry.cell_types import HEXAHEDRON
+from warp_mca.geometry.cell_types import HEXAHEDRON, TETRAHEDRON
 from warp_mca.geometry.mesh import Mesh
 
 _ROUNDING = 1e-7  # share of the mesh's extent within which places count as equal: gmsh divides arcs to about 1e-9
@@ -68,6 +68,33 @@ def pinned(points: np.ndarray, place: ArrayLike) -> np.ndarray:
         raise bad_value("place", np.asarray(place).tolist(), "no node of the mesh lies there; use even divisions")
     points[nearest] = place
     return points
+
+
+def only_cells(mesh: Mesh, name: str) -> Mesh:
+    """The part of a mesh that a cell set is, with what its sets have there.
+
+    Raises:
+        RequestError: there is no such set, or no cell in it.
+    """
+    if not len(mesh.cell_sets.get(name, ())):
+        raise bad_value("cell set", name, f"the mesh has {', '.join(sorted(mesh.cell_sets)) or 'no cell sets'}")
+    keep = np.zeros(mesh.cell_count, dtype=bool)
+    keep[mesh.cell_sets[name]] = True
+    index = np.cumsum(keep) - 1
+    kept, start = {}, 0
+    for kind, cells in mesh.cells.items():
+        kept[kind] = cells[keep[start : start + len(cells)]]
+        start += len(cells)
+    sets = {key: index[cells[keep[cells]]].astype(np.int32) for key, cells in mesh.cell_sets.items()}
+    return compact(
+        replace(
+            mesh,
+            hexahedra=kept.pop(HEXAHEDRON.name),
+            tetrahedra=kept.pop(TETRAHEDRON.name),
+            others={kind: cells for kind, cells in kept.items() if len(cells)},
+            cell_sets={key: cells for key, cells in sets.items() if len(cells)},
+        )
+    )
 
 
 def compact(mesh: Mesh) -> Mesh:

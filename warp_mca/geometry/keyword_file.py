@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import accumulate, pairwise
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from warp_mca.geometry.deck import Block, Deck, blocks, integer, real
+from warp_mca.geometry.deck import Deck, integer, real
 from warp_mca.geometry.deck_rules import ELEMENTS, KEYWORD_RULES
+from warp_mca.geometry.keyword_text import EIGHT, Keyword, keywords
 
 if TYPE_CHECKING:
     import meshio
@@ -16,12 +16,7 @@ if TYPE_CHECKING:
 KEYWORD_SUFFIXES = (".k", ".key", ".dyn")
 
 
-def _columns(*widths: int) -> list[slice]:
-    """The columns of the fields of a card."""
-    return [slice(a, b) for a, b in pairwise(accumulate(widths, initial=0))]
-
-
-_NODE, _SOLID, _OTHER = _columns(8, 16, 16, 16, 8, 8), _columns(*[8] * 10), _columns(*[10] * 8)
+_NODE, _SOLID = (8, 16, 16, 16, 8, 8), (8,) * 10
 _PART_CARDS = {"PART": 2, "PART_CONTACT": 3, "PART_PRINT": 3}  # of each part; of others the first one is named
 Card = list[str]
 
@@ -34,80 +29,87 @@ def read_keywords(path: Path) -> tuple[meshio.Mesh, list[str]]:
     Raises:
         ValueError: a card cannot be read, or a keyword would change the mesh in a way that is not read.
     """
-    with path.open(errors="replace") as file:
-        reader = _Reader(Deck(path), "created by Gmsh" in file.readline())
-    for block in blocks(path, "$"):
-        if block.keyword.upper().split()[:1] == ["END"]:
-            break
-        try:
+    reader = MeshReader(path)
+    try:
+        for block in keywords(path):
             reader.take(block)
-        except ValueError as error:
-            raise ValueError(f"line {reader.line}: {error}") from error
+    except ValueError as error:
+        raise ValueError(reader.at(error)) from error
     return reader.finish()
 
 
-def _fields(line: str, columns: list[slice] = _OTHER) -> Card:
-    """The fields of a card, without the empty ones at its end."""
-    found = [entry.strip() for entry in (line.split(",") if "," in line else [line[part] for part in columns])]
-    while found and not found[-1]:
-        found.pop()
-    return found
+class MeshReader:
+    """Takes the keywords of a deck in turn. Wedges of gmsh, as the first line tells, have another order.
 
+    Attributes:
+        deck: what was read.
+        place: of the card that is being read.
+        titles: of parts, by number.
+        parts: solids of each part.
+        held: code of the axes along which a node is held, by its number, as its card has it.
+    """
 
-class _Reader:
-    """Takes the blocks of a file in turn; `by_gmsh`: gmsh wrote it, whose wedges have another order."""
-
-    def __init__(self, deck: Deck, by_gmsh: bool) -> None:
-        self.deck, self.by_gmsh, self.line = deck, by_gmsh, 0
+    def __init__(self, path: Path) -> None:
+        with path.open(errors="replace") as file:
+            self.by_gmsh = "created by Gmsh" in file.readline()
+        self.deck, self.place = Deck(path), ""
         self.titles: dict[int, str] = {}
-        self.parts: dict[int, list[int]] = {}  # solids of each part
-        self.ranges: list[tuple[dict[str, list[int]], str, range]] = []  # of members: table and name of the set
+        self.parts: dict[int, list[int]] = {}
+        self.held: dict[int, int] = {}
+        self._ranges: list[tuple[dict[str, list[int]], str, range]] = []  # of members: table and name of the set
 
-    def take(self, block: Block) -> None:
-        """Read one block, or count it."""
-        self.line, text = block.line, block.keyword.upper()
-        words = text.split() or [""]
-        if words[0].endswith(("+", "%")) or (words[0] == "KEYWORD" and ("LONG=" in text or "I10=Y" in text)):
-            raise ValueError("its cards have long fields, not the standard ones")
-        name = words[0].rstrip("-").removesuffix("_TITLE")
+    def at(self, error: ValueError) -> str:
+        """An error with the place of the card, unless it names one."""
+        return str(error) if str(error).startswith("line ") or not self.place else f"{self.place}: {error}"
+
+    def take(self, block: Keyword) -> None:
+        """Read one keyword, or count it."""
+        self.place, name = block.place, block.name
         try:
             kind = KEYWORD_RULES.kind(name)
         except ValueError as error:
             raise ValueError(f"*{error}") from error
-        if name == "NODE":
-            self._take_nodes(block)
-        elif name == "ELEMENT_SOLID":
-            self._take_solids(block)
+        if name in ("NODE", "ELEMENT_SOLID"):
+            self.take_mesh(block)
         elif kind == "read" and name.startswith("SET_"):
-            self._take_set(name, block, titled="_TITLE" in words[0])
+            self._take_set(block)
         elif name == "ELEMENT_SHELL" and self.by_gmsh:
             self._take_marks(block)
         else:
             if name.startswith("PART"):
-                self._take_titles(name, block)
-            cards = sum(bool(text.strip()) for _, text in block.data)
+                self._take_titles(block)
+            cards = sum(bool(line.strip()) for _, line in block.lines)
             if cards and kind == ELEMENTS:
                 self.deck.left[kind, f"cards of *{name}"] += cards
             elif cards and kind not in ("", "read"):
                 self.deck.left[kind, f"*{name}"] += 1
 
-    def _cards(self, block: Block, columns: list[slice] = _OTHER) -> Iterator[Card]:
-        for self.line, text in block.data:
-            if card := _fields(text, columns):
+    def take_mesh(self, block: Keyword) -> None:
+        """Read *NODE or *ELEMENT_SOLID."""
+        if block.name == "NODE":
+            self._take_nodes(block)
+        else:
+            self._take_solids(block)
+
+    def _cards(self, block: Keyword, widths: Sequence[int] = EIGHT) -> Iterator[Card]:
+        for self.place, line in block.lines:
+            if card := block.fields(line, widths):
                 yield card
 
-    def _take_nodes(self, block: Block) -> None:
+    def _take_nodes(self, block: Keyword) -> None:
         """Cards: number, x, y, z, constraints."""
         for card in self._cards(block, _NODE):
             x, y, z = (real(entry) for entry in (*card[1:4], "", "", "")[:3])
             self.deck.add_node(integer(card[0]), (x, y, z))
+            if len(card) > 4 and (code := int(real(card[4]))):
+                self.held[integer(card[0])] = code
 
-    def _take_solids(self, block: Block) -> None:
+    def _take_solids(self, block: Keyword) -> None:
         """Cards: number, part, nodes; the nodes may stand on a card of their own, or go on after a comma at its end."""
         rest: list[int] = []
-        for self.line, text in block.data:
-            rest += [integer(entry or "0") for entry in _fields(text, _SOLID)]
-            open_end = text.endswith(",") and len(rest) == 11  # gmsh writes ten nodes so
+        for self.place, line in block.lines:
+            rest += [integer(entry or "0") for entry in block.fields(line, _SOLID)]
+            open_end = line.endswith(",") and len(rest) == 11  # gmsh writes ten nodes so
             if len(rest) > 2 and not open_end:
                 kind, nodes = _solid(rest[2:], self.by_gmsh)
                 self.deck.add_cell(rest[0], kind, nodes)
@@ -116,40 +118,41 @@ class _Reader:
         if rest:
             raise ValueError(f"the nodes of solid {rest[0]} are missing")
 
-    def _take_marks(self, block: Block) -> None:
+    def _take_marks(self, block: Keyword) -> None:
         """Cards: number, part, nodes; of shells, which gmsh writes for named surfaces, beside solids of any number."""
         for number, _, *nodes in self._cards(block, _SOLID):
             corners = list(dict.fromkeys(integer(entry) for entry in nodes[:4]))
             self.deck.add_face(-integer(number), "*ELEMENT_SHELL", corners, mark=True)
 
-    def _take_titles(self, name: str, block: Block) -> None:
+    def _take_titles(self, block: Keyword) -> None:
         """Cards of each part: title; number, section, material; others, as the keyword has them."""
-        count = _PART_CARDS.get(name, max(2, len(block.data)))
-        for (_, title), (self.line, card) in zip(block.data[::count], block.data[1::count], strict=False):
-            if found := _fields(card):
+        count = _PART_CARDS.get(block.name, max(2, len(block.lines)))
+        for (_, title), (self.place, card) in zip(block.lines[::count], block.lines[1::count], strict=False):
+            if found := block.fields(card):
                 self.titles[integer(found[0])] = title.strip()
 
-    def _take_set(self, name: str, block: Block, titled: bool) -> None:
-        """Cards: title if `titled`; number of the set; its members, ranges of them, or four nodes of each segment."""
-        lines = [text for _, text in block.data]
+    def _take_set(self, block: Keyword) -> None:
+        """Cards: a title, if any; number of the set; its members, ranges of them, or four nodes of each segment."""
+        name, titled = block.name, block.titled
+        lines = [line for _, line in block.lines]
         title = lines[0].strip() if titled else ""
-        key = title or f"set_{integer(_fields(lines[titled])[0])}"
+        key = title or f"set_{integer(block.fields(lines[titled])[0])}"
         members: list[int] = []
         used = {"SET_SEGMENT": 4, "SET_NODE_COLUMN": 1}.get(name, 8)
-        for self.line, text in block.data[titled + 1 :]:
-            members += [n for entry in _fields(text)[:used] if (n := integer(entry or "0"))]
+        for self.place, line in block.lines[titled + 1 :]:
+            members += [n for entry in block.fields(line)[:used] if (n := integer(entry or "0"))]
         sets = self.deck.cell_sets if name.startswith("SET_SOLID") else self.deck.node_sets
         sets.setdefault(key, [])
         if name.endswith("_GENERATE"):
             ranges = zip(members[::2], members[1::2], strict=True)
-            self.ranges += [(sets, key, range(low, high + 1)) for low, high in ranges]
+            self._ranges += [(sets, key, range(low, high + 1)) for low, high in ranges]
         else:
             sets[key] += members
 
     def finish(self) -> tuple[meshio.Mesh, list[str]]:
         """The mesh, and sentences about what is left out."""
         deck = self.deck
-        for sets, key, span in self.ranges:
+        for sets, key, span in self._ranges:
             known = deck.nodes if sets is deck.node_sets else deck.cells
             sets[key] += [n for n in known if n in span]
         for number in sorted(self.parts):

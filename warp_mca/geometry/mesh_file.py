@@ -17,7 +17,7 @@ from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.geometry.abaqus_file import ABAQUS_SUFFIXES, read_abaqus
 from warp_mca.geometry.cell_types import CELL_TYPES, TETRA10, stored_types
 from warp_mca.geometry.degenerate import stored
-from warp_mca.geometry.edit import compact
+from warp_mca.geometry.edit import compact, only_cells
 from warp_mca.geometry.end_marks import END_REQUIRED, missing_end
 from warp_mca.geometry.keyword_file import KEYWORD_SUFFIXES, read_keywords
 from warp_mca.geometry.mesh import Mesh
@@ -64,11 +64,14 @@ class MeshFile:
         path: of the file.
         scale: metres for one unit of its coordinates, 1e-3 for millimetres.
         select: more node sets.
+        only: name of a cell set, all of the mesh that is taken: an instance, a part or a physical volume as a body of
+            its own.
     """
 
     path: str | Path
     scale: float = 1.0
     select: tuple[Select, ...] = ()
+    only: str | None = None
 
     def __post_init__(self) -> None:
         validate.plain(self)
@@ -76,6 +79,8 @@ class MeshFile:
             raise bad_value("MeshFile.path", self.path, "give the path of a mesh file")
         validate.positive("MeshFile", scale=self.scale)
         check_selections("MeshFile", self.select)
+        if self.only is not None:
+            validate.texts("MeshFile", only=self.only)
 
     def build(self) -> Mesh:
         """Reads the file; what it holds besides is left out with a warning, which `Mesh.notes` keeps.
@@ -83,7 +88,15 @@ class MeshFile:
         Raises:
             RequestError: it cannot be read, or holds something other than sound hexahedra.
         """
-        read, notes = self._read()
+        mesh = self.converted(*self._read())
+        return with_selections(mesh if self.only is None else only_cells(mesh, self.only), self.select)
+
+    def converted(self, read: meshio.Mesh, notes: list[str]) -> Mesh:
+        """What a reader gave as a mesh, with sentences about what is left out, which are told.
+
+        Raises:
+            RequestError: it holds something other than sound cells.
+        """
         points = self.scale * np.array(read.points, dtype=np.float64)
         if points.ndim != 2 or points.shape[1] != 3:
             raise self._bad("its points are not three-dimensional; save it with x, y and z")
@@ -115,8 +128,7 @@ class MeshFile:
                 )
         for note in notes:
             logging.getLogger("warp_mca").warning("%s", note)
-        mesh = compact(Mesh(points, node_sets=node_sets, cell_sets=cell_sets, notes=tuple(notes), **arrays))
-        return with_selections(mesh, self.select)
+        return compact(Mesh(points, node_sets=node_sets, cell_sets=cell_sets, notes=tuple(notes), **arrays))
 
     def _read(self) -> tuple[meshio.Mesh, list[str]]:
         """The file's mesh with cells of known types, and sentences about what is left out."""

@@ -1,0 +1,1 @@
+"""Owns LS-DYNA keyword decks as scenes: `read_deck`."""
