@@ -214,3 +214,32 @@ def test_nodes_behind_a_face_that_leans_but_outside_of_its_body_are_free(end: fl
         name="beside", bodies=(plate, cube), contacts="all" if contacts == "all" else listed, impact=impact
     )
     assert mca.run(scene).summary["extremes"]["F_n_max"] == 0.0
+
+
+@pytest.mark.parametrize("cells", [2, 4])
+@pytest.mark.parametrize("how", ["press", "heat"])
+def test_what_springs_take_of_the_preload_of_flat_contacts_is_said(how: str, cells: int):
+    """Two bars of n cells each, held at their far ends: default springs, stiff as 2 cells each, leave n / (n + 2)."""
+    side, delta, rubber = 0.01, 2e-5, mca.Elastic(E=1e8, nu=0.0, rho=1e3)
+    box = mca.Box(size=(2.0 * side, side, side), divisions=(cells, 1, 1))
+    bodies = [mca.Body(name="a", geometry=box, material=rubber)]
+    place = 2.0 * side - (delta if how == "press" else 0.0)
+    bodies.append(replace(bodies[0], name="b", position=(place, 0.0, 0.0)))
+    sides = mca.Surface(body="a", nodes="xmax"), mca.Surface(body="b", nodes="xmin")
+    contact = mca.Contact(slave=sides[0], master=sides[1], initial_overlap="press" if how == "press" else "refuse")
+    heat = mca.ThermalStrain(body="a", expansion=1e-5, temperature=delta / (2.0 * side) / 1e-5)
+    scene = mca.Scene(
+        name="preload",
+        bodies=tuple(bodies),
+        contacts=(contact,),
+        fixed=(mca.Fixed(body="a", nodes="xmin", axes="x"), mca.Fixed(body="b", nodes="xmax", axes="x")),
+        loads=() if how == "press" else (heat,),
+        phases=(mca.Settle(duration=1.0),),
+        impact=mca.ImpactPhase(duration=2e-4, output_interval=1e-5),
+    )
+    result = mca.run(scene)
+    stiff = 1e8 * side**2 * delta / (4.0 * side)
+    assert result.F_n[-10:].mean() == pytest.approx(stiff * cells / (cells + 2.0), rel=0.005)
+    (loss,) = result.summary["contact_spring_loss"].values()
+    assert loss == pytest.approx(-2.0 / (cells + 2.0), rel=0.01)
+    assert any(f"springs take up {-loss:.0%} of the interference that holds a–b at rest" in w for w in result.warnings)
