@@ -249,7 +249,7 @@ def test_a_run_stops_where_nothing_is_left_of_a_surface():
     body = mca.Body(name="block", geometry=block, material=glass, velocity=(0.0, 0.0, -20.0))
     contact = mca.Contact(slave=mca.Surface(body="block", nodes="boundary"), master=wall)
     impact = mca.ImpactPhase(duration=1e-5, output_interval=1e-7)
-    with pytest.raises(GuardError, match="all elements at the surface boundary of body block have failed"):
+    with pytest.raises(GuardError, match=r"the surface boundary of body block have failed by t = \de-0[67] s; "):
         mca.run(mca.Scene(name="burst", bodies=(body,), contacts=(contact,), impact=impact))
 
 

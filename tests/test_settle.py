@@ -209,6 +209,9 @@ def test_a_hung_bar_rests_at_its_static_shape(cells: int):
     result = mca.run(hung, threads=1)
     sag = -result.probes[0].position[result.time >= 0.0, 1]
     np.testing.assert_allclose(sag, bar.rho * G * length**2 / (2.0 * bar.E), rtol=1e-3)
+    (end,), speed = result.summary["probes"], np.linalg.norm(result.probes[0].velocity, axis=1)
+    assert end["velocity_max"] == speed[result.time >= 0.0].max() < 0.01 * speed.max()
+    assert end["displacement_end"][1] == pytest.approx(0.0, abs=1e-3 * sag[0])
 
 
 @pytest.mark.parametrize(

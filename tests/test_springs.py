@@ -110,6 +110,43 @@ def test_points_off_the_centre_turn_a_rigid_block():
     assert np.abs(result["spring_r_m"] + result["spring_l_m"]).max() < 1e-6 * r / w
 
 
+@pytest.mark.parametrize(("inertia", "z"), [((1e-5, 1e-5, 1e-5), 0.1), ((2e-6, 8e-6, 1e-5), 0.0)], ids=("cube", "flat"))
+def test_points_of_a_body_without_geometry_may_lie_anywhere(inertia: tuple[float, float, float], z: float):
+    """A spring and a probe far outside the brick that stands for its inertia: beside the equations of motion."""
+    m, J, k, anchor, arm = 0.1, inertia[2], 2e3, np.array([0.12, 0.03]), np.array([0.05, 0.02])
+
+    def turned(angle: float) -> np.ndarray:
+        c, s = math.cos(angle), math.sin(angle)
+        return np.array([[c, -s], [s, c]]) @ arm
+
+    def rates(_: float, y: np.ndarray) -> np.ndarray:
+        r = turned(y[2])
+        between = anchor - y[:2] - r
+        length = np.linalg.norm(between)
+        T = k * (length - np.linalg.norm(anchor - arm)) * between / length
+        return np.array([*y[3:], *(T / m), (r[0] * T[1] - r[1] * T[0]) / J])
+
+    span, v, rate = 0.01, (-2.0, 1.0), 30.0
+    end = solve_ivp(rates, (0.0, span), [0.0, 0.0, 0.0, *v, rate], rtol=1e-9, atol=1e-12).y[:, -1]
+    body = mca.Body(
+        name="a", rigid=True, mass=m, inertia=inertia, velocity=(*v, 0.0), angular_velocity=(0.0, 0.0, rate)
+    )
+    spring = mca.Spring(name="s", body="a", at=(*arm, 0.0), other_at=(*anchor, 0.0), stiffness=k)
+    impact = mca.ImpactPhase(duration=span, output_interval=span / 50.0)
+    probe = mca.Probe(name="p", body="a", at=(*arm, z))
+    result = mca.run(mca.Scene(name="free", bodies=(body,), loads=(spring,), impact=impact, probes=(probe,)))
+    assert result.probes[0].position[-1] == pytest.approx([*(end[:2] + turned(end[2])), z], abs=2e-5)
+    assert result.summary["energy_error"] < 1e-3
+
+
+def test_a_point_too_far_from_a_flat_body_is_refused():
+    body = mca.Body(name="a", rigid=True, mass=0.1, inertia=(1e-5, 1e-5, 2e-5))
+    spring = mca.Spring(name="s", body="a", at=(0.0, 0.0, 0.5), other_at=(0.0, 0.0, 1.0), stiffness=1.0)
+    impact = mca.ImpactPhase(duration=1e-3, output_interval=1e-4)
+    with pytest.raises(mca.RequestError, match=r"body a is too thin or too small, by its inertia, for a point so far"):
+        mca.run(mca.Scene(name="flat", bodies=(body,), loads=(spring,), impact=impact))
+
+
 @pytest.mark.parametrize("element", ["hex8i", "tet4"])
 def test_a_flexible_block_on_a_soft_spring_swings_as_a_rigid_one(element: str):
     """By the mass centre of its nodes, so that no wave goes through it; and by a face, to 1e-3 of the amplitude."""

@@ -215,6 +215,12 @@ def _(beyond: bool) -> list[str]:
     return told_of(energy.soft_springs, given, shares={"c": springs})
 
 
+@pair(energy.soft_preload)
+def _(beyond: bool) -> list[str]:
+    springs = SpringShare(share=0.2, loss=over(energy.soft_preload, beyond), rest=True)
+    return told_of(energy.soft_preload, stacked(2, 2), shares={"c": springs})
+
+
 @pair(energy.lagging_vectors)
 def _(beyond: bool) -> list[str]:
     model = SimpleNamespace(blocks=[SimpleNamespace(element="hex8i", plastic=True)])

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from warp_mca.base import validate
-from warp_mca.base.arrays import Array
+from warp_mca.base.arrays import Array, Index
+from warp_mca.base.errors import bad_value
 from warp_mca.geometry.box import Box
 from warp_mca.geometry.mass_properties import HEAVIEST, LIGHTEST, Matrix, inertia_matrix
 from warp_mca.geometry.mesh import Mesh
 
 CARRIERS = "inertia"  # node set of the corners that carry a given mass
+FARTHEST = 1e3  # weight of a corner in the place of a point, at most: rounding of the corners grows by so much
 LEAST = 1e-4  # half an edge over the longest, at least: an inertia is then off by its square
 
 
@@ -70,3 +72,26 @@ def corner_points(mass: float, centre: Array, inertia: Array) -> Array:
     half, axes = half_edges(mass, inertia)
     signs = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
     return centre + (half * signs) @ axes.T
+
+
+def corner_weights(field: str, body: str, place: Array, mesh: Mesh) -> tuple[Index, Array]:
+    """Corners of the brick that stands for a rigid body, and weights by which a point moves with them.
+
+    They are (1 + sum_k s_k xi_k) / 8 with signs s of corners, linear in the place xi in half edges: any place has
+    its weights.
+
+    Args:
+        field, body: for errors.
+        place: of the point [m], shape (3,).
+        mesh: of the `InertiaBrick`.
+
+    Raises:
+        RequestError: the point, of the named field, lies farther away than rounding allows.
+    """
+    centre = mesh.points.mean(axis=0)
+    arms = mesh.points - centre
+    weight = 0.125 + arms @ np.linalg.solve(arms.T @ arms, place - centre)  # arms^T arms = 8 sum_k h_k h_k^T
+    if not np.abs(weight).max() <= FARTHEST:
+        remedy = f"body {body} is too thin or too small, by its inertia, for a point so far from it; give a nearer one"
+        raise bad_value(field, tuple(place.tolist()), remedy)
+    return np.arange(8, dtype=np.int32), weight

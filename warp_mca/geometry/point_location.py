@@ -13,6 +13,7 @@ from warp_mca.geometry import tetrahedron
 from warp_mca.geometry.boxes import Boxes, cell_boxes
 from warp_mca.geometry.cell_types import HEXAHEDRON, MAX_CORNERS, TETRAHEDRON, linear_type
 from warp_mca.geometry.hexahedron import shape_functions
+from warp_mca.geometry.inertia_brick import corner_weights
 from warp_mca.geometry.mesh import Mesh
 
 CANDIDATES = 64  # candidate cells for each point: the centres of long thin cells are far away
@@ -104,12 +105,16 @@ LOCATE: dict[str, Callable[[Array, Array, Index, Boxes], Located]] = {
 }  # by stored cell type
 
 
-def around_point(field: str, body: str, place: Array, mesh: Mesh) -> tuple[Index, Array]:
+def around_point(field: str, body: str, place: Array, mesh: Mesh, inertia: bool = False) -> tuple[Index, Array]:
     """The corners of the cell around a point of a body [m], shape (3,), with its shape functions there as weights.
 
+    Of a body that is an `inertia` without geometry the point may lie anywhere.
+
     Raises:
-        RequestError: the point, of the named field, lies outside the body.
+        RequestError: the point, of the named field, lies outside the body, or too far from an inertia.
     """
+    if inertia:
+        return corner_weights(field, body, place, mesh)
     at = place[None]
     found = []
     for name, cells in mesh.cells.items():

@@ -99,15 +99,17 @@ def locate_sensors(scene: Scene, meshes: Mapping[str, Mesh]) -> Sensors:
     """
     masses = nodal_masses(scene, meshes) if any(probe.nodes is not None for probe in scene.probes) else {}
     spots = (
-        _around(probe, meshes[probe.body]) if probe.nodes is None else _of_set(probe, meshes[probe.body], masses)
+        _around(probe, meshes[probe.body], scene.body(probe.body).is_inertia)
+        if probe.nodes is None
+        else _of_set(probe, meshes[probe.body], masses)
         for probe in scene.probes
     )
     return Sensors(tuple(spots), tuple(_cut(section, meshes[section.body]) for section in scene.sections))
 
 
-def _around(probe: Probe, mesh: Mesh) -> Spot:
+def _around(probe: Probe, mesh: Mesh, inertia: bool) -> Spot:
     place = np.array(probe.at, dtype=np.float64)
-    return Spot(probe.body, *around_point(f"{probe.title}.at", probe.body, place, mesh))
+    return Spot(probe.body, *around_point(f"{probe.title}.at", probe.body, place, mesh, inertia))
 
 
 def _of_set(probe: Probe, mesh: Mesh, masses: Mapping[str, Array]) -> Spot:

@@ -125,8 +125,10 @@ class Exposed:
             return surface_faces(self._parts, surface)
         node, element = self._faces[body].surface(surface.nodes, self._own(body, alive))
         if not len(node):
+            time = self._state.steps * self._solver.dt
             raise GuardError(
-                f"all elements at the surface {surface.nodes} of body {body} have failed; end the run before"
+                f"all elements at the surface {surface.nodes} of body {body} have failed by t = {time:.4g} s; end the "
+                "run before"
             )
         return faces_of(self._parts, body, node, element)
 

@@ -11,6 +11,7 @@ from warp_mca.kernels.contact.spring import ANY_DEPTH
 from warp_mca.physics.contact.bonds import nearest_of_side, normals
 from warp_mca.physics.elements.cells import body_materials
 from warp_mca.scene import Contact, ContactAll, RigidPlane
+from warp_mca.watch.energy import WEIGHT
 
 if TYPE_CHECKING:
     from warp_mca.phases.prepare import Prepared
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
 CROSSINGS = 6.0  # times in which waves cross the longer body while springs of a press fit come to their full force
 LEAST_STEPS = 60  # of these
-WEIGHT = 2.0  # times the weight of all bodies: springs of no more force bear it, and begin with it
 STARTING = 0.01  # of their energy if the full force came at once, the least to which an imbalance is compared
 BESIDE = 0.01  # of a face's width, by which nodes may lie beside it, as at the edges of round surfaces
 

@@ -121,7 +121,7 @@ class SceneRun:
         before: Sequence[Rows] = (),
         origin: float = 0.0,
     ) -> Result:
-        """What came of it; figures of the summary are those of the impact, but for the probes and sections.
+        """What came of it; figures of the summary are those of the impact, but for probes and sections after a swing.
 
         Args:
             wall: seconds by stage.
@@ -136,7 +136,9 @@ class SceneRun:
         summary |= self._rigid_facts(own.history, stopped is not None)
         told = self._told(stopped is not None, history=own.history, contacts=own.contacts, shares=shares, origin=origin)
         found = joined(ready.scene, ready.probes, [*before, own])
-        summary |= sensor_figures(found["probes"], found["sections"], found["history"])
+        last = slice(-len(own.history["time_s"]) if ready.scene.phases else 0, None)
+        seen, cut = ([item.at(last) for item in found[name]] for name in ("probes", "sections"))
+        summary |= sensor_figures(seen, cut, {name: column[last] for name, column in found["history"].items()})
         if before:
             summary["phases"] = [part.facts for part in (*before, own)]
         return Result(summary=summary, warnings=(*told, *said), stopped=stopped, **found)

@@ -19,7 +19,7 @@ from warp_mca.results.units import units_of
 from warp_mca.scene import Scene
 
 Array = NDArray[np.float64]
-Rows = NDArray[np.integer] | NDArray[np.bool_]
+Rows = NDArray[np.integer] | NDArray[np.bool_] | slice
 
 NPZ, CSV = "probes.npz", "probes.csv"
 UNEVEN = "filter the rows of one impact by themselves, as result.impact(0).probes[0].filtered(180)"
@@ -79,7 +79,7 @@ class ProbeHistory:
         return self.filtered()
 
     def at(self, rows: Rows) -> ProbeHistory:
-        """The same in some output intervals: their numbers, shape (count,), or whether each is, shape (row_count,)."""
+        """The same in some output intervals: a slice, numbers (count,), or whether each is one of them (row_count,)."""
         return replace(self, time=self.time[rows], position=self.position[rows], velocity=self.velocity[rows])
 
 

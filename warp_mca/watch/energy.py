@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from warp_mca.base.arrays import Array
 from warp_mca.kernels.records.columns import PRESSURE, SPRING_ENERGY
 from warp_mca.physics.contact.surfaces import is_curved_contact
 from warp_mca.physics.elements import ELEMENTS
-from warp_mca.scene import Contact
+from warp_mca.scene import Contact, ContactAll, Settle, ThermalStrain
 from warp_mca.watch.ledger import MIN_EXCHANGE
 from warp_mca.watch.row import Context, Finished, SpringShare, Values, row, sides_of
 from warp_mca.watch.vibration import impedance, shadow
@@ -27,6 +28,7 @@ PEAK_LOSS = 0.3
 # which may ring at 3.4 times that force.
 WAVE = (1.3, 4.0)
 STILL = 1e-6  # share of a relative velocity along the normal up to which bodies do not approach each other
+WEIGHT = 2.0  # times the weight of all bodies: a contact at rest of no more force bears it
 WEAK = 0.7  # force of a flat contact over that of one wave below which springs that were given are softer than waves
 
 
@@ -68,14 +70,29 @@ def soft_springs(c: Finished, most: float) -> Iterator[Values]:
     """Estimated loss of each contact's force peak by the energy in its springs then, see `spring_shares`."""
     curved = _curved(c.model)
     for k, ((name, springs), contact) in enumerate(zip(c.shares.items(), c.scene.contacts, strict=True)):
-        given = isinstance(contact, Contact) and contact.stiffness is not None
-        if springs is not None and springs.loss > most and not given:
+        if springs is not None and springs.loss > most and not springs.rest and not _given(contact):
             remedy = "raise the contact's penalty"
             if contact.penalty is None and k not in curved:
                 remedy = "give the contact penalty=10"
             elif contact.penalty is not None and k in curved:
                 remedy += " or leave it to its default"
             yield dict(share=springs.share, name=name, loss=springs.loss, remedy=remedy)
+
+
+@row(
+    "contact springs take up {loss:.0%} of the interference that holds {name} at rest, and its force is that much "
+    "below that of stiff springs:",
+    "give the contact penalty={penalty:.2g} and a time_step_scale at which its energy balance holds, or refine the "
+    "bodies along its normal",
+    0.03,
+    "of the force at most",
+)
+def soft_preload(c: Finished, most: float) -> Iterator[Values]:
+    """Loss of force of each contact that an interference loads at rest, see `spring_shares`."""
+    for (name, springs), contact in zip(c.shares.items(), c.scene.contacts, strict=True):
+        if springs is not None and springs.rest and springs.loss > most and not _given(contact):
+            penalty = contact.penalty if isinstance(contact, Contact) else None
+            yield dict(loss=springs.loss, name=name, penalty=10.0 if penalty is None else 10.0 * float(penalty))
 
 
 @row(
@@ -98,7 +115,8 @@ def spring_shares(c: Context, ledger: Ledger, names: Sequence[str]) -> dict[str,
     """Energy in the springs of each contact as a share s of what the bodies have exchanged, when its force is greatest.
 
     What is exchanged is kinetic energy gained or lost since the start, or energy that is not kinetic, whichever is
-    greater, as for `Ledger.exchange_error`. None where there is no force, or hardly anything was exchanged.
+    greater, as for `Ledger.exchange_error`. None where there is no force, or hardly anything was exchanged. Where an
+    interference loads contacts at rest, all their springs and the bodies are in series: they lose s of its force.
 
     Args:
         c: scene, meshes and model.
@@ -109,16 +127,44 @@ def spring_shares(c: Context, ledger: Ledger, names: Sequence[str]) -> dict[str,
     work, kinetic = energy.pop("external_work"), energy["kinetic"]
     stored = sum(energy.values(), np.zeros(len(work)))
     exchanged = np.maximum(np.abs(kinetic - kinetic[:1]), stored - kinetic)
+    series = energy["contact"] + energy["elastic"]  # what an interference stores in springs and bodies
     found: dict[str, SpringShare | None] = dict.fromkeys(names)
     for k, name in enumerate(names):
         own = springs[:, [item.contact == k for item in c.model.passes]]
-        force = own[..., PRESSURE].sum(axis=1)
-        row = int(force.argmax()) if len(force) else 0
-        if len(force) and force[row] > 0.0 and exchanged[row] > MIN_EXCHANGE * ledger.kept.energy_scale:
-            share = float(own[row, :, SPRING_ENERGY].sum() / exchanged[row])
-            loss = _loss(c, k, share, float(force[row]), ledger.time())
+        force, held = own[..., PRESSURE].sum(axis=1), own[..., SPRING_ENERGY].sum(axis=1)
+        greatest = int(force.argmax()) if len(force) else 0
+        if not len(force) or force[greatest] <= 0.0 or exchanged[greatest] <= MIN_EXCHANGE * ledger.kept.energy_scale:
+            continue
+        row = _row_at_rest(c, k, force, greatest)
+        if row is None:
+            share = float(held[greatest] / exchanged[greatest])
+            loss = _loss(c, k, share, float(force[greatest]), ledger.time())
             found[name] = SpringShare(share=share, loss=loss)
+        else:
+            loss = float(energy["contact"][row] / series[row])
+            found[name] = SpringShare(share=float(held[row] / series[row]), loss=loss, rest=True)
     return found
+
+
+def _given(contact: Contact | ContactAll) -> bool:
+    """Whether a scene says how stiff each spring of a contact is."""
+    return isinstance(contact, Contact) and contact.stiffness is not None
+
+
+def _row_at_rest(c: Context, k: int, force: Array, greatest: int) -> int | None:
+    """Row at which an interference loads contact k of bodies at rest: a press fit, or heat. None if there is none.
+
+    That of the greatest force [N], of shape (row_count,), or the first one after the bodies have settled.
+    """
+    passes = [item for item in c.model.passes if item.contact == k]
+    heated = any(isinstance(load, ThermalStrain) for load in c.scene.loads)
+    if not heated and all(item.initial_overlap != "press" for item in passes):
+        return None
+    if any(c.model.V[item.slave].any() or c.model.V[item.master].any() for item in passes):
+        return None
+    row = 0 if any(isinstance(phase, Settle) for phase in c.scene.phases) else greatest
+    weight = float(np.linalg.norm(c.scene.gravity)) * float(c.model.mass.sum())
+    return row if force[row] > WEIGHT * weight else None
 
 
 def _curved(model: Model) -> set[int]:

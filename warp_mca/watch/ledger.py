@@ -37,6 +37,7 @@ from warp_mca.model.viscosity import thermal_energy
 from warp_mca.system.columns import added_columns, column_count
 from warp_mca.system.records import SceneRecords
 from warp_mca.watch.guards import Reading, stop
+from warp_mca.watch.remedies import imbalance_remedy
 from warp_mca.watch.row import When
 
 if TYPE_CHECKING:
@@ -221,16 +222,9 @@ class Ledger:
 
     @property
     def remedy(self) -> str:
-        """What helps against an imbalance: penalty only where contact was touched, float64 only for what turns."""
-        found = "lower time_step_scale"
-        if self.kept.touched:
-            found += " or a contact's penalty"
-        if self.model.rates:
-            found += ", take fewer groups in multi_rate"
-        turned = self.spin * self.time()
-        if self.precision == "mixed" and turned > TURNED and not self.framed:
-            found += ", choose --precision float64 for bodies that turn so far"
-        return found
+        """What helps against an imbalance."""
+        turned = self.precision == "mixed" and self.spin * self.time() > TURNED and not self.framed
+        return imbalance_remedy(self.model, self.kept.touched, turned)
 
     @property
     def exchanges(self) -> bool:

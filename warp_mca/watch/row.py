@@ -112,10 +112,17 @@ class Context:
 
 @dataclass(frozen=True, kw_only=True)
 class SpringShare:
-    """Share of the exchanged energy that springs of a contact hold, and the loss of its force peak by that [-]."""
+    """Share of the exchanged energy that springs of a contact hold, and the loss of its force peak by that [-].
+
+    Attributes:
+        share: of the energy; where an interference loads the contact at rest, of that which it stores.
+        loss: of the force.
+        rest: whether an interference loads the contact at rest, as a press fit or heat does.
+    """
 
     share: float
     loss: float
+    rest: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)

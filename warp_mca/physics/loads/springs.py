@@ -92,9 +92,9 @@ def build(load: Spring, assembly: Bodies) -> SpringNodes:
     own = [_lightness(assembly, body, *end, n) for body, end in zip(bodies, ends, strict=True)]
     node, weight = (np.concatenate(parts) for parts in zip(*ends, strict=True))
     added, decay = [], []
-    for body, (nodes, share) in zip(bodies, ends, strict=True):
+    for body, (nodes, share), light in zip(bodies, ends, own, strict=True):
         rigid = assembly.scene.body(body).rigid
-        whole = WHOLE * k * share / assembly.mass[nodes]
+        whole = WHOLE * k * (share / assembly.mass[nodes] if share.min() >= 0.0 else np.full(len(nodes), light))
         added.append(whole if rigid else np.full(len(nodes), k * sum(own)))
         decay.append(np.full(len(nodes), (BRAKED if rigid else 1.0) * c * sum(own)))
     return SpringNodes(
@@ -122,11 +122,12 @@ def _point(
     mesh, first = assembly.meshes[body], assembly.node_start[body]
     if nodes is None:
         field = f"{load.title}.{'at' if key == 'body' else 'other_at'}"
-        node, weight = around_point(field, body, np.array(at, dtype=np.float64), mesh)
+        place = np.array(at, dtype=np.float64)
+        node, weight = around_point(field, body, place, mesh, assembly.scene.body(body).is_inertia)
     else:
         node, weight = weighted_set(mesh.nodes(nodes), assembly.mass[assembly.all_nodes(body)])
-    own, place = np.unique(node, return_inverse=True)  # corners of wedges coincide
-    return own + first, np.bincount(place, weight).astype(np.float64)
+    own, which = np.unique(node, return_inverse=True)  # corners of wedges coincide
+    return own + first, np.bincount(which, weight).astype(np.float64)
 
 
 def _lightness(assembly: Bodies, body: str, node: Index, weight: Array, n: Array) -> float:

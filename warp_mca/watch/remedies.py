@@ -1,0 +1,45 @@
+"""Owns what helps against an imbalance of energy."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from warp_mca.physics.contact.surfaces import is_curved_contact
+
+if TYPE_CHECKING:
+    from warp_mca.system.model import Model
+
+MEETING = 0.05  # of the master's smallest edge: nodes of both surfaces so near to each other meet
+NODES = 4  # that meet, from which on surfaces lie on each other with matching meshes
+
+
+def imbalance_remedy(model: Model, touched: bool, turned: bool) -> str:
+    """What helps: penalty only where contact was touched, float64 only for what `turned` in mixed precision."""
+    found = "lower time_step_scale"
+    if touched:
+        found += " or a contact's penalty"
+        if _meet_at_corners(model):
+            found = "give the curved contact without friction a mu, or its surfaces meshes whose nodes do not meet"
+    if model.rates:
+        found += ", take fewer groups in multi_rate"
+    if turned:
+        found += ", choose --precision float64 for bodies that turn so far"
+    return found
+
+
+def _meet_at_corners(model: Model) -> bool:
+    """Whether curved surfaces without friction start with their nodes on each other.
+
+    A node at a corner of facets goes from one to the other and back while it presses; each time its force turns by the
+    angle between them, which makes energy at any step. Friction holds it.
+    """
+    from scipy.spatial import KDTree
+
+    for item in model.passes:
+        if item.mu == 0.0 and len(item.face) and is_curved_contact(model.X, item):
+            apart, _ = KDTree(model.X[item.master]).query(model.X[item.slave])
+            if (np.asarray(apart) < MEETING * np.sqrt(item.smallest_area)).sum() >= NODES:
+                return True
+    return False
