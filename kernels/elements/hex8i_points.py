@@ -112,6 +112,11 @@ def sums_function(precision: str, law_name: str, finite: bool, points: int) -> A
         return growth
 
     @wp.func
+    def beyond_mean(variance: R, theta: R):
+        """Of ln(J)^2 / 2, of points beyond that of their mean J = 1 + theta."""
+        return R(0.5) * variance * (R(1.0) - theta) / ((R(1.0) + theta) * (R(1.0) + theta))
+
+    @wp.func
     def point_sums(
         H: mat33,
         L0: mat33,
@@ -170,10 +175,7 @@ def sums_function(precision: str, law_name: str, finite: bool, points: int) -> A
             M0 = M0 + eta * moment
             M1 = M1 + xi * moment
             M2 = M2 + (xi * eta) * total
-        # of ln(J)^2 / 2, beyond that of its mean
-        J = R(1.0) + mean_theta
-        excess = R(0.5) * variance * (R(1.0) - mean_theta) / (J * J)
-        return mean, R0, R1, R2, M0, M1, M2, largest, stress2, flag_new, excess
+        return mean, R0, R1, R2, M0, M1, M2, largest, stress2, flag_new, beyond_mean(variance, mean_theta)
 
     return point_sums
 

@@ -142,7 +142,9 @@ def check_drop(args: argparse.Namespace) -> None:
         raise bad_value(f"--{name}", getattr(args, name), remedy)
     kept = f"print a scene with 'warp-mca run {args.scene} > drop.py', then run that"
     if getattr(args, "units", None) is not None:
-        raise bad_value("--units", args.units, f"a deck runs as the scene that it is; leave it or the drop out, or {kept}")
+        raise bad_value(
+            "--units", args.units, f"a deck runs as the scene that it is; leave it or the drop out, or {kept}"
+        )
     if args.method != "mca":
         raise bad_value("--method", args.method, f"a drop starts at the impact; {kept}")
     if args.checkpoint is not None:
