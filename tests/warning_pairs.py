@@ -218,7 +218,9 @@ def _(beyond: bool) -> list[str]:
 @pair(energy.soft_preload)
 def _(beyond: bool) -> list[str]:
     springs = SpringShare(share=0.2, loss=over(energy.soft_preload, beyond), rest=True)
-    return told_of(energy.soft_preload, stacked(2, 2), shares={"c": springs})
+    scene = stacked(2, 2)
+    chosen = replace(scene, contacts=tuple(replace(contact, penalty="auto") for contact in scene.contacts))
+    return told_of(energy.soft_preload, chosen, shares={"c": springs})
 
 
 @pair(energy.lagging_vectors)

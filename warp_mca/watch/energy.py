@@ -91,8 +91,9 @@ def soft_preload(c: Finished, most: float) -> Iterator[Values]:
     """Loss of force of each contact that an interference loads at rest, see `spring_shares`."""
     for (name, springs), contact in zip(c.shares.items(), c.scene.contacts, strict=True):
         if springs is not None and springs.rest and springs.loss > most and not _given(contact):
-            penalty = contact.penalty if isinstance(contact, Contact) else None
-            yield dict(loss=springs.loss, name=name, penalty=10.0 if penalty is None else 10.0 * float(penalty))
+            given = contact.penalty if isinstance(contact, Contact) else None
+            penalty = 10.0 if given is None or isinstance(given, str) else 10.0 * given
+            yield dict(loss=springs.loss, name=name, penalty=penalty)
 
 
 @row(
