@@ -9,7 +9,7 @@ import pytest
 
 from warp_mca.geometry.deck_rules import ABAQUS_RULES, ELEMENTS, KEYWORD_RULES, NASTRAN_RULES, OTHER, Rules
 
-PAGE = (Path(__file__).parent.parent / "docs" / "parts.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parent.parent / "docs" / "api" / "geometry.md").read_text(encoding="utf-8")
 FORMATS = {"Abaqus and CalculiX": ABAQUS_RULES, "Nastran": NASTRAN_RULES, "LS-DYNA": KEYWORD_RULES}
 STRUCTURE = re.compile(r"END.*|BEGIN.*|KEYWORD.*|STEP|PART_.*|SET_NODE|CORD\*|CPYRA")  # read, and not worth a word
 

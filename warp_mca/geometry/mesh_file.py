@@ -52,7 +52,7 @@ class MeshFile:
 
     Readers of our own take input files of Abaqus, Nastran and LS-DYNA, gmsh .unv, meshio .msh, .vtu and all others that
     it knows, VTK those of its files that meshio does not. What would move, add or change nodes, cells or sets and is
-    not read is refused; what else a file holds, as shells and loads, is left out with a warning (docs/parts.md).
+    not read is refused; what else a file holds, as shells and loads, is left out with a warning (docs/api/geometry.md).
     Tetrahedra of ten nodes keep them, unless cells of other types share some; all other quadratic cells are taken as
     linear ones, which is a warning too, as are edges that would spoil their cell, which become straight.
 
