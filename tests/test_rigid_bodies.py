@@ -355,6 +355,6 @@ def test_unknown_names_of_rigid_bodies_are_refused():
 def test_scenes_without_rigid_bodies_hold_no_arrays_for_them():
     state = begun(chain("")).state
     assert {name: array.size for name, array in state.arrays().items() if name.startswith("rigid/")} == dict.fromkeys(
-        [f"rigid/{name}" for name in ("centre", "rotation", "momentum", "spin", "orientation")], 0
+        [f"rigid/{name}" for name in ("centre", "rotation", "momentum", "spin", "orientation", "turn")], 0
     )
     assert figures(begun(chain("B")))  # and a scene with them gives figures

@@ -104,6 +104,7 @@ def rigid_body(precision: str, device: str) -> Found:
     step.turn = wp.array([AXIS * math.tan(0.5 * angle)], dtype=wp.vec3d, device=device)
     step.velocity, poses.centre = (wp.zeros(1, dtype=wp.vec3d, device=device) for _ in range(2))
     step.turned, poses.rotation = wp.zeros(1, dtype=wp.mat33d, device=device), _rotation(device)
+    poses.turn = wp.zeros(1, dtype=wp.float64, device=device)
     wp.launch(turn_body, 1, [REVOLUTIONS, COARSE], [poses, step], device=device)
     return _of_quaternion(poses.rotation.numpy()[0], REVOLUTIONS * COARSE * angle), REVOLUTIONS * COARSE
 
