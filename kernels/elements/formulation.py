@@ -20,7 +20,7 @@ from warp_mca.kernels.records.extremes import keep_functions
 wp.set_module_options({"enable_backward": False})
 
 OWN, MEAN, NODAL, SPLIT = "own", "mean", "nodal", "split"
-# Greatest K / G that points of a SPLIT pressure have to themselves, with internal vectors and without: nu = 0.480, 0.406
+# Greatest K / G that points of a SPLIT pressure have to themselves, with internal vectors (nu = 0.480), without (0.406)
 OWN_SHARE, OWN_ALONE = 25.0, 5.0
 
 
