@@ -48,6 +48,22 @@ def root_function(precision: str) -> Any:
 
 
 @cache
+def trace_function(precision: str) -> Any:
+    """The function E -> tr E to rounding of E : E, as tr E = E : E - (tr E)^2 - 4 det E where det (I + 2 E) = 1.
+
+    The sum of the diagonal has no digits left where strains are below rounding.
+    """
+    mat33, R = scalars(precision).mat33, scalars(precision).real
+
+    @wp.func
+    def isochoric_trace(E: mat33):
+        trace = wp.trace(E)
+        return wp.ddot(E, E) - trace * trace - R(4.0) * wp.determinant(E)
+
+    return isochoric_trace
+
+
+@cache
 def law_kinematics(precision: str, law_name: str, finite: bool) -> Kinematics:
     """The strain measure that a law asks for, as `kinematics`: that of this file for hyperelastic ones."""
     found = kinematics(precision, finite)

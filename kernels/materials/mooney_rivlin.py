@@ -10,6 +10,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
+from warp_mca.kernels.materials.isochoric import trace_function
 
 wp.set_module_options({"enable_backward": False})
 
@@ -49,11 +50,11 @@ def mandel(precision: str) -> Any:
 def stored(precision: str) -> Any:
     """The function (E, c) -> energy [J/m^3]."""
     t = scalars(precision)
-    R, mat33, pair = t.real, t.mat33, wp.types.vector(2, t.real)
+    R, mat33, pair, trace_of = t.real, t.mat33, wp.types.vector(2, t.real), trace_function(precision)
 
     @wp.func
     def mooney_rivlin_energy(E: mat33, c: pair):
-        trace = R(2.0) * wp.trace(E)
+        trace = R(2.0) * trace_of(E)
         return c[0] * trace + c[1] * (R(2.0) * trace + R(0.5) * (trace * trace - R(4.0) * wp.ddot(E, E)))
 
     return mooney_rivlin_energy

@@ -6,6 +6,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
+from warp_mca.kernels.materials.isochoric import trace_function
 
 wp.set_module_options({"enable_backward": False})
 
@@ -43,10 +44,10 @@ def mandel(precision: str) -> Any:
 def stored(precision: str) -> Any:
     """The function (E, C10) -> C10 (I1 - 3) [J/m^3]."""
     t = scalars(precision)
-    R, mat33 = t.real, t.mat33
+    R, mat33, trace_of = t.real, t.mat33, trace_function(precision)
 
     @wp.func
     def neo_hookean_energy(E: mat33, C10: R):
-        return R(2.0) * C10 * wp.trace(E)
+        return R(2.0) * C10 * trace_of(E)
 
     return neo_hookean_energy

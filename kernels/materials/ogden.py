@@ -31,21 +31,23 @@ def parameters(precision: str, terms: str) -> Any:
 
 
 @cache
-def power_function(precision: str) -> Any:
-    """The function (E_i, alpha) -> l^alpha - 1 of the principal stretch l with l^2 = 1 + 2 E_i, to rounding."""
+def tangent_function(precision: str) -> Any:
+    """The function (E_i, alpha) -> t = tanh(alpha ln l / 2) of the principal stretch l, l^2 = 1 + 2 E_i, to rounding.
+
+    l^alpha - 1 = 2 t / (1 - t).
+    """
     R = scalars(precision).real
 
     @wp.func
-    def power_less_one(E: R, alpha: R):
+    def half_tangent(E: R, alpha: R):
         one = R(1.0)
         y = one + R(2.0) * E
         exact = y - one
         none = exact == R(0.0)
         log = wp.where(none, one, wp.log(y) / wp.where(none, one, exact)) * R(2.0) * E
-        t = wp.tanh(R(0.25) * alpha * log)  # exp(x) - 1 = 2 t / (1 - t) with t = tanh(x / 2)
-        return R(2.0) * t / (one - t)
+        return wp.tanh(R(0.25) * alpha * log)
 
-    return power_less_one
+    return half_tangent
 
 
 @cache
@@ -53,7 +55,7 @@ def mandel(precision: str, terms: str) -> Any:
     """The function (E, c) -> Mandel stress, with the principal values mu_p l_i^alpha_p less their mean."""
     t = scalars(precision)
     R, vec3, mat33, row = t.real, t.vec3, t.mat33, wp.types.vector(2 * int(terms), t.real)
-    principal, power = eigen_function(precision), power_function(precision)
+    principal, tangent = eigen_function(precision), tangent_function(precision)
 
     @wp.func
     def ogden_stress(E: mat33, c: row):
@@ -61,7 +63,8 @@ def mandel(precision: str, terms: str) -> Any:
         T = vec3()
         for p in range(wp.static(int(terms))):
             for i in range(3):
-                T[i] = T[i] + c[2 * p] * power(d[i], c[2 * p + 1])
+                x = tangent(d[i], c[2 * p + 1])
+                T[i] = T[i] + c[2 * p] * (R(2.0) * x / (R(1.0) - x))
         mean = R(THIRD) * (T[0] + T[1] + T[2])
         M = N * wp.diag(vec3(T[0] - mean, T[1] - mean, T[2] - mean)) * wp.transpose(N)
         return R(0.5) * (M + wp.transpose(M))
@@ -71,18 +74,26 @@ def mandel(precision: str, terms: str) -> Any:
 
 @cache
 def stored(precision: str, terms: str) -> Any:
-    """The function (E, c) -> energy [J/m^3]."""
+    """The function (E, c) -> energy [J/m^3].
+
+    As l1 l2 l3 = 1, the three t of `tangent_function` add up to minus their product: no digits are lost at small
+    strains.
+    """
     t = scalars(precision)
     R, mat33, row = t.real, t.mat33, wp.types.vector(2 * int(terms), t.real)
-    principal, power = eigen_function(precision), power_function(precision)
+    principal, tangent = eigen_function(precision), tangent_function(precision)
 
     @wp.func
     def ogden_energy(E: mat33, c: row):
         _N, d = principal(E)
         energy = R(0.0)
         for p in range(wp.static(int(terms))):
-            alpha = c[2 * p + 1]
-            energy += c[2 * p] / alpha * (power(d[0], alpha) + power(d[1], alpha) + power(d[2], alpha))
+            product, squares = R(1.0), R(0.0)
+            for i in range(3):
+                x = tangent(d[i], c[2 * p + 1])
+                product = product * x
+                squares += x * x / (R(1.0) - x)
+            energy += R(2.0) * c[2 * p] / c[2 * p + 1] * (squares - product)
         return energy
 
     return ogden_energy

@@ -199,7 +199,8 @@ class Ledger:
             self.kept.initial_kinetic = float(energy["kinetic"][0])
             work = work - self.kept.initial_work
         initial = self.initial_energy
-        scale = np.maximum.accumulate(np.maximum(abs(initial) + np.abs(work), self.kept.energy_scale))
+        released = np.maximum(-energy.get("spring", np.zeros(len(sums))), 0.0)  # by springs with a preload alone
+        scale = np.maximum.accumulate(np.maximum(abs(initial) + np.abs(work) + released, self.kept.energy_scale))
         self.kept.energy_scale = float(scale.max(initial=self.kept.energy_scale))
         self.kept.touched = self.kept.touched or bool(
             (self.springs(sums)[..., NORMAL_IMPULSE] > 0.0).any() or (energy["contact"] > 0.0).any()
