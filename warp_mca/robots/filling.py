@@ -1,83 +1,63 @@
-"""Owns the tetrahedra in closed surfaces that do not face away from their middle everywhere."""
+"""Owns the cells behind closed surfaces that do not face away from their middle everywhere."""
 
 from __future__ import annotations
 
-from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from warp_mca.base.arrays import Array, Index
-from warp_mca.base.errors import RequestError, bad_value
-from warp_mca.geometry.gmsh_session import gmsh_session
+from warp_mca.base.errors import bad_value
 
-TIME = 60.0  # that gmsh may take [s]
-_KEPT = 32  # surfaces whose tetrahedra stay in memory, for a machine that strikes several times
-_TRIANGLE, _TETRAHEDRON = 2, 4  # gmsh's numbers of cell types
+if TYPE_CHECKING:
+    from warp_mca.geometry.mesh import Mesh
+
+DEPTH = 0.3  # of a cell behind a triangle, over the square root of its area
 
 
-def concave_cells(name: str, points: Array, faces: Index) -> tuple[Array, Index]:
-    """Nodes in a closed surface [m], shape (count, 3), and tetrahedra between all nodes, those of the surface first.
+def cells_behind(name: str, points: Array, faces: Index) -> tuple[Array, Index]:
+    """A tetrahedron behind each triangle of a closed surface, with a node of its own, as contact needs no more.
+
+    No volume is filled, so that surfaces that cross or touch themselves, as published meshes do, need no repair.
 
     Args:
         name: of the geom, for messages.
         points: nodes of the surface [m], shape (node_count, 3), float64.
         faces: its triangles, counterclockwise from outside, shape (triangle_count, 3), int32.
 
+    Returns:
+        The nodes behind [m], shape (triangle_count, 3), float64; and cells that count the nodes of the surface first,
+        shape (triangle_count, 4), int32.
+
     Raises:
-        RequestError: the surface is open, faces inwards or crosses itself.
+        RequestError: the surface is open or faces inwards.
     """
     edges = np.concatenate([faces[:, [k, (k + 1) % 3]] for k in range(3)]).astype(np.int64)
     one, other = (np.sort(edges @ order) for order in ((len(points), 1), (1, len(points))))
-    if (np.diff(one) == 0).any() or not np.array_equal(one, other):
+    if not np.array_equal(one, other):
         lone = len(np.setxor1d(one, other)) // 2
-        remedy = f"its surface has holes or edges of more than two triangles ({lone} open edges); close it"
-        raise bad_value("Robot: geom", name, remedy)
+        raise bad_value("Robot: geom", name, f"its surface is open ({lone} open edges); close it")
     a, b, c = (points[faces[:, k]] for k in range(3))
     if np.einsum("ij,ij->i", a - points[0], np.cross(b - points[0], c - points[0])).sum() <= 0.0:
         raise bad_value("Robot: geom", name, "its surface faces inwards; turn its triangles over")
-    try:
-        return _cells(np.ascontiguousarray(points).tobytes(), np.ascontiguousarray(faces, dtype=np.int32).tobytes())
-    except RequestError:
-        raise
-    except Exception as error:
-        if type(error) is not Exception:  # gmsh raises nothing more specific than this
-            raise
-        words = " ".join(str(error).split()).rstrip(".")
-        remedy = f"gmsh cannot fill its surface ({words}), which may cross itself; repair it, or cut it into parts"
-        raise bad_value("Robot: geom", name, remedy) from error
+    across = np.cross(b - a, c - a)
+    twice = np.linalg.norm(across, axis=1, keepdims=True)
+    behind = (a + b + c) / 3.0 - DEPTH * np.sqrt(0.5 / twice) * across
+    apexes = np.arange(len(points), len(points) + len(faces), dtype=np.int32)
+    return behind, np.concatenate([apexes[:, None], faces], axis=1).astype(np.int32)
 
 
-@lru_cache(maxsize=_KEPT)
-def _cells(point_bytes: bytes, face_bytes: bytes) -> tuple[Array, Index]:
-    """`concave_cells` of arrays as bytes.
+def held_mass(mesh: Mesh, density: float) -> dict[str, Any]:
+    """Mass, centre and inertia of a body of the world with such cells, as of the box around it; {} where cells fill it.
 
-    Raises:
-        Exception: gmsh cannot make them, or changed the surface.
+    Args:
+        mesh: of the body.
+        density: [kg/m^3].
     """
-    points = np.frombuffer(point_bytes).reshape(-1, 3)
-    faces = np.frombuffer(face_bytes, dtype=np.int32).reshape(-1, 3)
-    size = float(np.linalg.norm(np.ptp(points, axis=0)))
-    with gmsh_session(TIME, Mesh__MeshSizeMax=size, Mesh__MeshSizeExtendFromBoundary=0.0) as gmsh:
-        surface = gmsh.model.addDiscreteEntity(2)
-        tags = np.arange(1, len(points) + 1)
-        gmsh.model.mesh.addNodes(2, surface, tags.tolist(), points.ravel().tolist())
-        gmsh.model.mesh.addElementsByType(surface, _TRIANGLE, [], (faces.ravel() + 1).tolist())
-        gmsh.model.geo.addVolume([gmsh.model.geo.addSurfaceLoop([surface])])
-        gmsh.model.geo.synchronize()
-        gmsh.model.mesh.generate(3)
-        found, places, _ = gmsh.model.mesh.getNodes()
-        kept = gmsh.model.mesh.getElementsByType(_TRIANGLE)[1]
-        cells = np.asarray(gmsh.model.mesh.getElementsByType(_TETRAHEDRON)[1], dtype=np.int64).reshape(-1, 4)
-    order = np.argsort(found)
-    ordered = np.asarray(places).reshape(-1, 3)[order]
-    same = len(kept) == faces.size and np.array_equal(
-        *(_sorted(f) for f in (np.asarray(kept).reshape(-1, 3) - 1, faces))
-    )
-    if not same or not len(cells) or not np.array_equal(ordered[: len(points)], points):
-        raise Exception("it changed the surface")
-    return ordered[len(points) :], np.searchsorted(np.asarray(found)[order], cells).astype(np.int32)
-
-
-def _sorted(faces: Index) -> Index:
-    corners = np.sort(faces.astype(np.int64), axis=1)
-    return corners[np.lexsort(corners.T)]
+    if len(np.unique(mesh.tetrahedra[:, 0])) == 1:
+        return {}
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    square = (high - low) ** 2
+    mass = density * float(np.prod(high - low))
+    inertia = tuple(float(v) for v in mass / 12.0 * (square.sum() - square))
+    return {"mass": mass, "centre": tuple(float(v) for v in 0.5 * (low + high)), "inertia": inertia}

@@ -12,7 +12,7 @@ import numpy as np
 from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.robots.filling import concave_cells
+from warp_mca.robots.filling import cells_behind
 from warp_mca.robots.skins import Skin
 
 if TYPE_CHECKING:
@@ -153,10 +153,11 @@ def hull(points: Array) -> tuple[Array, Index]:
 def filled(name: str, surface: tuple[Array, Index], node_set: str) -> Mesh:
     """A mesh of tetrahedra in a closed surface, whose nodes come first; `node_set` names them.
 
-    From the middle of the surface to its triangles where all of these face away from it, else by gmsh.
+    From the middle of the surface to its triangles where all of these face away from it, else a flat one behind each
+    triangle: the mass of the body is that of the file.
 
     Raises:
-        RequestError: the surface is open, faces inwards or crosses itself.
+        RequestError: the surface is open or faces inwards.
     """
     points, faces = surface
     middle = points[np.unique(faces)].mean(axis=0)
@@ -164,7 +165,7 @@ def filled(name: str, surface: tuple[Array, Index], node_set: str) -> Mesh:
     if (np.einsum("ij,ij->i", a, np.cross(b, c)) > 0.0).all():
         inner, corners = middle[None], np.concatenate([np.full((len(faces), 1), len(points)), faces], axis=1)
     else:
-        inner, corners = concave_cells(name, points, faces)
+        inner, corners = cells_behind(name, points, faces)
     nodes = np.arange(len(points), dtype=np.int32)
     return Mesh(
         points=np.vstack([points, inner]),
