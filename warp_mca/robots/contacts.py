@@ -11,6 +11,7 @@ import numpy as np
 from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.robots.drawing import drawn_geoms
+from warp_mca.robots.filling import held_mass
 from warp_mca.robots.geoms import filled, geom_surface, is_long, is_round, joined, touching_at
 from warp_mca.robots.machine import Machine, Motion
 from warp_mca.scene import Body, Contact, RigidPlane, Surface
@@ -173,7 +174,9 @@ class Contacts:
                 continue
             turned, zero = np.array(machine.data.geom_xmat[geom]).reshape(3, 3), np.zeros(3)
             pose = Motion(np.array(machine.data.geom_xpos[geom]), turned, zero, zero)
-            body = Body(name=self._beside_name(name), geometry=self._mesh(geom), material=STEEL, rigid=True)
+            mesh = self._mesh(geom)
+            own = held_mass(mesh, STEEL.rho)
+            body = Body(name=self._beside_name(name), geometry=mesh, material=STEEL, rigid=True, **own)
             found.append(replace(body, position=_vec(pose.origin), rotation=_vec(pose.turn())))
         if self._drawn:
             found += self._scenery()

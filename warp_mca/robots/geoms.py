@@ -12,6 +12,7 @@ import numpy as np
 from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.robots.filling import cells_behind
 from warp_mca.robots.skins import Skin
 
 if TYPE_CHECKING:
@@ -150,23 +151,26 @@ def hull(points: Array) -> tuple[Array, Index]:
 
 
 def filled(name: str, surface: tuple[Array, Index], node_set: str) -> Mesh:
-    """A mesh of tetrahedra from the middle of a closed surface to its triangles; `node_set` names its nodes.
+    """A mesh of tetrahedra in a closed surface, whose nodes come first; `node_set` names them.
+
+    From the middle of the surface to its triangles where all of these face away from it, else a flat one behind each
+    triangle: the mass of the body is that of the file.
 
     Raises:
-        RequestError: a triangle does not face away from the middle.
+        RequestError: the surface is open or faces inwards.
     """
     points, faces = surface
     middle = points[np.unique(faces)].mean(axis=0)
     a, b, c = (points[faces[:, k]] - middle for k in range(3))
-    if (np.einsum("ij,ij->i", a, np.cross(b, c)) <= 0.0).any():
-        remedy = "its surface does not face away from its middle everywhere; cut it into parts that do"
-        raise bad_value("Robot: geom", name, remedy)
-    corners = np.concatenate([np.full((len(faces), 1), len(points)), faces], axis=1).astype(np.int32)
+    if (np.einsum("ij,ij->i", a, np.cross(b, c)) > 0.0).all():
+        inner, corners = middle[None], np.concatenate([np.full((len(faces), 1), len(points)), faces], axis=1)
+    else:
+        inner, corners = cells_behind(name, points, faces)
     nodes = np.arange(len(points), dtype=np.int32)
     return Mesh(
-        points=np.vstack([points, middle]),
+        points=np.vstack([points, inner]),
         hexahedra=np.zeros((0, 8), np.int32),
-        tetrahedra=corners,
+        tetrahedra=corners.astype(np.int32),
         node_sets={node_set: nodes},
     )
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from warp_mca.robots.robot import Robot
 
 SUFFIXES = (".xml", ".mjcf", ".urdf")
+PACKAGE = "package:/"  # begins names of meshes that ROS finds; MuJoCo takes two slashes for one
 EXACT = 1e-12  # of MuJoCo's distances of convex geoms [m]
 
 
@@ -93,9 +94,28 @@ def _parsed(mj: Any, robot: Robot) -> Any:
         remedy = "this is a folder; name a file in it" if path.is_dir() else "there is no such file"
         raise bad_value("Robot.file", robot.path, remedy)
     try:
-        return mj.MjSpec.from_file(str(path))
+        spec = mj.MjSpec.from_file(str(path))
     except (ValueError, RuntimeError) as error:
         raise bad_value("Robot.file", robot.path, f"MuJoCo says: {_words(error)}; correct the file") from error
+    for mesh in spec.meshes:
+        if mesh.file.startswith(PACKAGE):
+            mesh.file = str(_in_package(robot, mesh.file))
+    return spec
+
+
+def _in_package(robot: Robot, name: str) -> Path:
+    """The file that package://NAME/REST of a URDF means: REST in the folder NAME beside or above it.
+
+    Raises:
+        RequestError: there is none.
+    """
+    package, _, rest = name.removeprefix(PACKAGE).lstrip("/").partition("/")
+    for above in Path(robot.path).resolve().parents:
+        for folder in (above / package, *([above] if above.name == package else [])):
+            if (folder / rest).is_file():
+                return folder / rest
+    remedy = f"no folder {package} beside the file or above it has {rest} (package:// of a mesh); copy it there"
+    raise bad_value("Robot.file", robot.path, remedy)
 
 
 def _words(error: Exception) -> str:

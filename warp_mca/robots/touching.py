@@ -103,7 +103,9 @@ class Pair:
             return Nearest(float(distance), ends[:3], ends[3:])
         first, second = self.first.pose(data, t), self.second.pose(data, t)
         if self.second.plane is not None:
-            return self._over_plane(first, self.second.plane)
+            return self._over_plane(first, np.array(self.second.plane.point), np.array(self.second.plane.normal))
+        if self.second.skin is None:  # a plane of the file
+            return self._over_plane(first, second.origin, second.rotation[:, 2])
         if self.first.geom is not None and self.second.geom is not None:
             ends, model = np.zeros(6), self._machine.model
             apart = float(self._mj.mj_geomDistance(model, data, self.first.geom, self.second.geom, FAR, ends))
@@ -115,11 +117,11 @@ class Pair:
             key=lambda item: item.distance,
         )
 
-    def _over_plane(self, pose: Pose, plane: RigidPlane) -> Nearest:
-        normal = np.array(plane.normal) / np.linalg.norm(plane.normal)
+    def _over_plane(self, pose: Pose, origin: Array, normal: Array) -> Nearest:
+        normal = normal / np.linalg.norm(normal)
         assert self.first.skin is not None
         points = pose.origin + self.first.skin.points @ pose.rotation.T
-        heights = (points - np.array(plane.point)) @ normal
+        heights = (points - origin) @ normal
         lowest = int(heights.argmin())
         return Nearest(float(heights[lowest]), points[lowest], points[lowest] - heights[lowest] * normal)
 
@@ -221,5 +223,10 @@ def _ready(mj: Any, machine: Machine, a: Side, b: Side, geoms: Any) -> Pair:
     }
     if all(side.geom is not None and int(machine.model.geom_type[side.geom]) in smooth for side in (a, b)):
         return Pair(mj, machine, a, b)
-    a, b = (side if side.skin or side.plane else geoms(side) for side in (a, b))
-    return Pair(mj, machine, *((b, a) if a.plane else (a, b)))
+    flat = [side.plane is not None or _is_plane(mj, machine, side) for side in (a, b)]
+    a, b = (side if side.skin or plane else geoms(side) for side, plane in zip((a, b), flat, strict=True))
+    return Pair(mj, machine, *((b, a) if flat[0] else (a, b)))
+
+
+def _is_plane(mj: Any, machine: Machine, side: Side) -> bool:
+    return side.geom is not None and int(machine.model.geom_type[side.geom]) == int(mj.mjtGeom.mjGEOM_PLANE)
