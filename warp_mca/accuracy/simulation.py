@@ -30,6 +30,7 @@ from warp_mca.phases.simulate import simulate
 from warp_mca.recorders.portrait import Portrait
 from warp_mca.recorders.recorder import Recorder
 from warp_mca.results.criteria import with_verdict
+from warp_mca.results.figure_style import check_figures
 from warp_mca.results.result import Result
 from warp_mca.results.storage import check_output, hold, write
 from warp_mca.scene import Scene
@@ -59,6 +60,7 @@ def run(
     progress: Progress | bool | None = None,
     method: str = "mca",
     checkpoint: str | Every | None = None,
+    figures: str = "png",
 ) -> Result:
     """Run a scene: rigid phase if it has one, hand-off, finite-element impact.
 
@@ -82,6 +84,7 @@ def run(
         progress: called with a stage and the share of it that is done; True shows a bar, or lines if piped.
         method: "mca" swings rigid links; "pure-fem" computes the swing by finite elements too.
         checkpoint: how often `out` gets the state, as `Every.parse` has it, from which the same call goes on.
+        figures: "none" draws nothing: `out` gets no PNG files, and its report has tables alone.
 
     Returns:
         The result, with histories as float64 arrays.
@@ -92,6 +95,7 @@ def run(
     """
     check_scene("scene", scene)
     scene = with_options(scene, refine, mass_scaling, meshes)
+    drawn = check_figures(figures)
     span, settings = span_of(scene, duration), settings_of(device, precision, threads, multi_rate)
     _check_files(recorders, out, force)
     every, shown = _every(method, checkpoint, out, scene, recorders, accuracy), Portrait(recorders)
@@ -99,7 +103,8 @@ def run(
     typed = {"refine": refine, "mass_scaling": mass_scaling, "multi_rate": multi_rate}
     again = partial(run, device=device, precision=precision, threads=threads, duration=duration)
     plan = planned(scene, accuracy, typed, device, meshes, again)
-    return run_planned(plan, partial(_kept, partial(_judged, scene, meshes, method, request), shown, out, force, every))
+    judged = partial(_judged, scene, meshes, method, request)
+    return run_planned(plan, partial(_kept, judged, shown if drawn else None, out, force, every))
 
 
 def _every(
@@ -125,7 +130,7 @@ def _every(
 
 def _kept(
     result: Callable[[Checkpoint | None, Plan | None], Result],
-    shown: Portrait,
+    shown: Portrait | None,
     out: str | os.PathLike[str] | None,
     force: bool,
     every: Every | None,
@@ -133,7 +138,7 @@ def _kept(
 ) -> Result:
     """What came of a run, which holds its folder meanwhile if it writes to one; arguments as in `run`.
 
-    `shown` has the pictures of the report.
+    `shown` has the pictures of the report; without it nothing is drawn.
 
     Raises:
         RequestError: the folder cannot be used.
@@ -143,7 +148,8 @@ def _kept(
     with hold(out, force=force) as folder:
         store = Checkpoint(folder.path, every, force) if every else None
         found = result(store, plan)
-        found = write(found, folder, force=force, images=partial(shown.images, found.failed))
+        images = partial(shown.images, found.failed) if shown else tuple
+        found = write(found, folder, force=force, images=images, figures=shown is not None)
         if store:
             store.remove()
         return found
