@@ -9,7 +9,7 @@ import pytest
 from warp_mca.geometry import Box
 from warp_mca.rigid.chain import Chain, Link, slender_link
 from warp_mca.rigid.placement import Placement, link_placements
-from warp_mca.rigid.plain_chain import acceleration_of
+from warp_mca.rigid.plain_chain import acceleration_of, end_point
 from warp_mca.rigid.swing import swing, swing_until
 from warp_mca.rigid.target import TargetPlane, TurningPlane, moving_plane, node_gap
 from warp_mca.rigid.touch import Gap
@@ -174,13 +174,18 @@ def test_accelerations_in_plain_numbers_are_those_of_the_chain(count: int, slide
         theta, rates, force = draw(-3.0, 3.0, (3, chain.coordinate_count))
         for given in (None, force):
             expected = chain.acceleration(theta, rates, given)
+            assert end_point(chain, (0.4, -0.2))(theta) == pytest.approx(
+                chain.at(count - 1, (0.4, -0.2), theta, rates)[0], rel=1e-12, abs=1e-12
+            )
             assert plain(theta, rates, given) == pytest.approx(expected, rel=1e-11, abs=1e-11 * np.abs(expected).max())
 
 
 def test_the_acceleration_of_a_pendulum_and_what_has_none():
     """theta'' = -3 g sin(theta) / (2 l) of a rod; a link without inertia about its hinge, and an angle without end."""
     theta = np.array([0.3])
-    assert acceleration_of(pendulum())(theta, np.ones(1), None) == pytest.approx(-1.5 * G / LENGTH * np.sin(theta), rel=1e-14)
+    assert acceleration_of(pendulum())(theta, np.ones(1), None) == pytest.approx(
+        -1.5 * G / LENGTH * np.sin(theta), rel=1e-14
+    )
     empty = Chain(links=(Link(body="a", mass=1.0, centre=(0.0, 0.0), inertia=0.0),))
     with pytest.raises(np.linalg.LinAlgError):
         acceleration_of(empty)(theta, np.zeros(1), None)

@@ -30,7 +30,6 @@ from warp_mca.phases.simulate import simulate
 from warp_mca.recorders.portrait import Portrait
 from warp_mca.recorders.recorder import Recorder
 from warp_mca.results.criteria import with_verdict
-from warp_mca.results.figure_style import check_figures
 from warp_mca.results.result import Result
 from warp_mca.results.storage import check_output, hold, write
 from warp_mca.scene import Scene
@@ -73,7 +72,7 @@ def run(
         threads: CPU threads to use; None for all cores that this process may use. Results do not depend on it.
         multi_rate: groups of elements with steps of their own; "auto" chooses how many, None: all take one step.
         duration: of the impact phase [s]; the scene's own if None.
-        out: folder for summary.json, history.csv and the figures; nothing is written if None.
+        out, figures: folder for summary.json, history.csv and pictures (no PNG with "none"); None: nothing is written.
         force: replace results that `out` holds already.
         refine: how many times smaller the cells of all bodies are than their recipes say, in place of `Scene.refine`.
         mass_scaling: in place of `ImpactPhase.mass_scaling`, with the same values.
@@ -84,7 +83,6 @@ def run(
         progress: called with a stage and the share of it that is done; True shows a bar, or lines if piped.
         method: "mca" swings rigid links; "pure-fem" computes the swing by finite elements too.
         checkpoint: how often `out` gets the state, as `Every.parse` has it, from which the same call goes on.
-        figures: "none" draws nothing: `out` gets no PNG files, and its report has tables alone.
 
     Returns:
         The result, with histories as float64 arrays.
@@ -95,16 +93,14 @@ def run(
     """
     check_scene("scene", scene)
     scene = with_options(scene, refine, mass_scaling, meshes)
-    drawn = check_figures(figures)
     span, settings = span_of(scene, duration), settings_of(device, precision, threads, multi_rate)
     _check_files(recorders, out, force)
-    every, shown = _every(method, checkpoint, out, scene, recorders, accuracy), Portrait(recorders)
+    every, shown = _every(method, checkpoint, out, scene, recorders, accuracy), Portrait(recorders, figures)
     request = Request(span=span, settings=settings, tell=teller(progress), recorders=recorders, begun=shown.take)
     typed = {"refine": refine, "mass_scaling": mass_scaling, "multi_rate": multi_rate}
     again = partial(run, device=device, precision=precision, threads=threads, duration=duration)
     plan = planned(scene, accuracy, typed, device, meshes, again)
-    judged = partial(_judged, scene, meshes, method, request)
-    return run_planned(plan, partial(_kept, judged, shown if drawn else None, out, force, every))
+    return run_planned(plan, partial(_kept, partial(_judged, scene, meshes, method, request), shown, out, force, every))
 
 
 def _every(
@@ -130,7 +126,7 @@ def _every(
 
 def _kept(
     result: Callable[[Checkpoint | None, Plan | None], Result],
-    shown: Portrait | None,
+    shown: Portrait,
     out: str | os.PathLike[str] | None,
     force: bool,
     every: Every | None,
@@ -138,7 +134,7 @@ def _kept(
 ) -> Result:
     """What came of a run, which holds its folder meanwhile if it writes to one; arguments as in `run`.
 
-    `shown` has the pictures of the report; without it nothing is drawn.
+    `shown` has the pictures of the report.
 
     Raises:
         RequestError: the folder cannot be used.
@@ -148,8 +144,8 @@ def _kept(
     with hold(out, force=force) as folder:
         store = Checkpoint(folder.path, every, force) if every else None
         found = result(store, plan)
-        images = partial(shown.images, found.failed) if shown else tuple
-        found = write(found, folder, force=force, images=images, figures=shown is not None)
+        images = partial(shown.images, found.failed)
+        found = write(found, folder, force=force, images=images, figures=shown.drawn)
         if store:
             store.remove()
         return found

@@ -33,6 +33,23 @@ def acceleration_of(chain: Chain) -> Acceleration:
     return acceleration
 
 
+def end_point(chain: Chain, point: tuple[float, float]) -> Callable[[Array], tuple[float, float]]:
+    """World position [m] of a point in the last link's frame as a function of theta, as `chain.at` gives it."""
+    arms = [*(link.hinge_out for link in chain.links[:-1]), point]
+
+    def position(theta: Array) -> tuple[float, float]:
+        angles, (x, y) = theta.tolist(), chain.origin
+        if chain.slide is not None:
+            way = angles.pop(0)
+            x, y = x + way * chain.slide[0], y + way * chain.slide[1]
+        for angle, (a, b) in zip(angles, arms, strict=True):
+            sine, cosine = math.sin(angle), math.cos(angle)
+            x, y = x + b * cosine - a * sine, y - a * cosine - b * sine
+        return x, y
+
+    return position
+
+
 class _Plain:
     """Constants of a chain, and its equations of motion."""
 
