@@ -107,6 +107,19 @@ def test_the_import_is_light(tmp_path: Path):
     assert python(tmp_path, "-c", code, *HEAVY) == "[]"
 
 
+def test_a_run_without_figures_imports_only_what_it_uses(tmp_path: Path):
+    """Swing, impact and first peak, but no drawing; `scipy.signal`, with `scipy.stats`, takes half a second."""
+    words = ["run", "two_link", "--refine=0.35", "--duration=1e-5", "--figures=none", "--quiet", "--out=o"]
+    unused = [name for name in (*HEAVY, "scipy.signal", "scipy.stats") if name not in ("gmsh", "scipy", "warp")]
+    code = (
+        "import sys; from warp_mca.cli.main import main; main(sys.argv[1:]); print([n for n in {} if n in sys.modules])"
+    )
+    assert python(tmp_path, "-c", code.format(unused), *words) == "[]"
+    assert {path.name for path in (tmp_path / "o").iterdir()} == {
+        *("forces.npz", "history.csv", "paths.npz", "report.html", "summary.json")
+    }
+
+
 def test_every_public_name_can_be_had():
     import warp_mca
 

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from warp_mca.geometry import Box
-from warp_mca.rigid.chain import Chain, slender_link
+from warp_mca.rigid.chain import Chain, Link, slender_link
 from warp_mca.rigid.placement import Placement, link_placements
+from warp_mca.rigid.plain_chain import acceleration_of, end_point
 from warp_mca.rigid.swing import swing, swing_until
 from warp_mca.rigid.target import TargetPlane, TurningPlane, moving_plane, node_gap
 from warp_mca.rigid.touch import Gap
@@ -150,3 +151,43 @@ def test_plane_of_a_body_that_turns_stays_on_its_surface():
     still = moving_plane(mesh, Surface(body="box", nodes="ymax"), replace(placement, angular_velocity=np.zeros(3)), 0.4)
     assert isinstance(still, TargetPlane)
     np.testing.assert_allclose(still.at(0.4)[0][1], 2.03, atol=1e-15)
+
+
+@pytest.mark.parametrize("slide", [None, (0.6, 0.8)])
+@pytest.mark.parametrize("count", [1, 2, 3, 6, 8])
+def test_accelerations_in_plain_numbers_are_those_of_the_chain(count: int, slide: tuple[float, float] | None):
+    """Of any centres, hinges and gravity, with and without forces."""
+    draw = np.random.default_rng(count).uniform
+    links = tuple(
+        Link(
+            body=f"{k}",
+            mass=draw(0.5, 2.0),
+            centre=tuple(draw(-1, 1, 2)),
+            inertia=draw(0.1, 1.0),
+            hinge_out=tuple(draw(-1, 1, 2)),
+        )
+        for k in range(count)
+    )
+    chain = Chain(links=links, gravity=(1.3, -9.8), slide=slide, carriage_mass=0.7 if slide else 0.0)
+    plain = acceleration_of(chain)
+    for _ in range(20):
+        theta, rates, force = draw(-3.0, 3.0, (3, chain.coordinate_count))
+        for given in (None, force):
+            expected = chain.acceleration(theta, rates, given)
+            assert end_point(chain, (0.4, -0.2))(theta) == pytest.approx(
+                chain.at(count - 1, (0.4, -0.2), theta, rates)[0], rel=1e-12, abs=1e-12
+            )
+            assert plain(theta, rates, given) == pytest.approx(expected, rel=1e-11, abs=1e-11 * np.abs(expected).max())
+
+
+def test_the_acceleration_of_a_pendulum_and_what_has_none():
+    """theta'' = -3 g sin(theta) / (2 l) of a rod; a link without inertia about its hinge, and an angle without end."""
+    theta = np.array([0.3])
+    assert acceleration_of(pendulum())(theta, np.ones(1), None) == pytest.approx(
+        -1.5 * G / LENGTH * np.sin(theta), rel=1e-14
+    )
+    empty = Chain(links=(Link(body="a", mass=1.0, centre=(0.0, 0.0), inertia=0.0),))
+    with pytest.raises(np.linalg.LinAlgError):
+        acceleration_of(empty)(theta, np.zeros(1), None)
+    with np.errstate(invalid="ignore"):
+        assert np.isnan(acceleration_of(pendulum())(np.array([math.inf]), np.zeros(1), None)).all()

@@ -59,6 +59,7 @@ def run(
     progress: Progress | bool | None = None,
     method: str = "mca",
     checkpoint: str | Every | None = None,
+    figures: str = "png",
 ) -> Result:
     """Run a scene: rigid phase if it has one, hand-off, finite-element impact.
 
@@ -71,7 +72,7 @@ def run(
         threads: CPU threads to use; None for all cores that this process may use. Results do not depend on it.
         multi_rate: groups of elements with steps of their own; "auto" chooses how many, None: all take one step.
         duration: of the impact phase [s]; the scene's own if None.
-        out: folder for summary.json, history.csv and the figures; nothing is written if None.
+        out, figures: folder for summary.json, history.csv and pictures (no PNG with "none"); None: nothing is written.
         force: replace results that `out` holds already.
         refine: how many times smaller the cells of all bodies are than their recipes say, in place of `Scene.refine`.
         mass_scaling: in place of `ImpactPhase.mass_scaling`, with the same values.
@@ -94,7 +95,7 @@ def run(
     scene = with_options(scene, refine, mass_scaling, meshes)
     span, settings = span_of(scene, duration), settings_of(device, precision, threads, multi_rate)
     _check_files(recorders, out, force)
-    every, shown = _every(method, checkpoint, out, scene, recorders, accuracy), Portrait(recorders)
+    every, shown = _every(method, checkpoint, out, scene, recorders, accuracy), Portrait(recorders, figures)
     request = Request(span=span, settings=settings, tell=teller(progress), recorders=recorders, begun=shown.take)
     typed = {"refine": refine, "mass_scaling": mass_scaling, "multi_rate": multi_rate}
     again = partial(run, device=device, precision=precision, threads=threads, duration=duration)
@@ -143,7 +144,8 @@ def _kept(
     with hold(out, force=force) as folder:
         store = Checkpoint(folder.path, every, force) if every else None
         found = result(store, plan)
-        found = write(found, folder, force=force, images=partial(shown.images, found.failed))
+        images = partial(shown.images, found.failed)
+        found = write(found, folder, force=force, images=images, figures=shown.drawn)
         if store:
             store.remove()
         return found

@@ -14,6 +14,7 @@ from warp_mca.cli.accuracy import add_accuracy
 from warp_mca.cli.folder import folder
 from warp_mca.phases.every import METHODS
 from warp_mca.physics.elements import ELEMENTS
+from warp_mca.results.figure_style import FIGURES
 
 WELCOME = """\
 warp_mca computes the impact of flexible machines: rigid links swing until they touch something, then explicit
@@ -131,6 +132,9 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument("--out", type=folder, metavar="DIR", help="folder for the results (default: SCENE-PRESET)")
     group.add_argument("--force", action="store_true", help="replace results that the folder holds already")
+    group.add_argument(
+        "--figures", default="png", choices=FIGURES, help="none: draw nothing, which saves seconds (default: png)"
+    )
     said = group.add_mutually_exclusive_group()
     said.add_argument("--quiet", action="store_true", help="say nothing but warnings and errors")
     said.add_argument("--json", action="store_true", help="print summary.json in place of a table, for scripts")

@@ -39,6 +39,7 @@ OPTIONS: dict[str, tuple[type, ...]] = {
     "mass_scaling": (float, str),
     "method": (str,),
     "checkpoint": (str,),
+    "figures": (str,),
 }
 
 LISTED = {"set": "settings", "criterion": "criteria"}  # attributes of those that are given once for each

@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> None:
     request = read_request(args)
     out = args.out or Path(request.label if args.method == "mca" else f"{request.label}-{args.method}")
     recorders = recorders_of(args, out)
-    start_warp(*(["scipy.integrate"] if request.scene.rigid else []), "scipy.signal", "matplotlib.backends.backend_agg")
+    start_warp(*_needed(args, request))
     with _noting_what_is_left(args), nullcontext() if args.quiet else progress_bar() as progress:
         result = mca.run(
             request.scene,
@@ -67,12 +67,19 @@ def run(args: argparse.Namespace) -> None:
             progress=progress,
             method=args.method,
             checkpoint=_every(args),
+            figures=args.figures,
         )
     _tell(args, request, result, out, recorders)
     if result.failed:
         raise McaError(f"{', '.join(result.failed)}: not written whole, as the warnings say; all else is")
     if failed := unmet(result.summary):
         raise CriterionError("; ".join(failed))
+
+
+def _needed(args: argparse.Namespace, request: Request) -> list[str]:
+    """Modules that the run will use, which take long to import."""
+    swings = ["scipy.integrate"] if request.scene.rigid else []
+    return [*swings, *(["matplotlib.backends.backend_agg"] if args.figures == "png" else [])]
 
 
 def _tell(args: argparse.Namespace, request: Request, result: Result, out: Path, recorders: Sequence[Recorder]) -> None:
@@ -89,7 +96,8 @@ def _tell(args: argparse.Namespace, request: Request, result: Result, out: Path,
         written = [*FILES, *(CONTACT_FILES if result.contacts else ()), *(PATH_FILES if result.paths else ())]
         written += PROBE_FILES if result.probes or result.sections else ()
         recorded = [r.name for r in recorders if r.name not in result.failed and Path(r.name).exists()]
-        print_summary(result, [*(str(out / name) for name in written), *recorded])
+        present = (str(out / name) for name in written if (out / name).exists())
+        print_summary(result, [*present, *recorded])
     changed = (args.duration, args.time_step_scale, args.refine, args.mass_scaling, args.accuracy)
     as_designed = not args.settings and all(value is None for value in changed)
     if request.source and as_designed:
@@ -128,6 +136,9 @@ def _sweep(args: argparse.Namespace, worst: bool) -> None:
         raise bad_value("--sweep", args.sweeps[0], "recorders show single runs; leave them out")
     if args.method != "mca" or args.checkpoint is not None:
         raise bad_value("--sweep", args.sweeps[0], "its runs take no --method and no --checkpoint; leave these out")
+    if args.figures == "none":
+        remedy = "its runs draw all figures; leave --figures out, or use warp-mca sweep, which draws none"
+        raise bad_value("--sweep", args.sweeps[0], remedy)
     if args.quiet or args.json:
         raise bad_value("--sweep", args.sweeps[0], "--quiet and --json are for single runs; leave these out")
     sweep.sweep(args, "--sweep", args.sweeps, folders=True, worst=worst)

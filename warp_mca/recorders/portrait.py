@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from warp_mca.results.figure_style import check_figures
 from warp_mca.results.html_page import MEDIA, Image
 
 if TYPE_CHECKING:
@@ -20,10 +21,19 @@ LARGEST = 32 << 20  # of a file that is put into the report [byte]
 
 
 class Portrait:
-    """The skins of a run as they were when its model was first assembled, and the recorders that draw more."""
+    """The skins of a run as they were when its model was first assembled, and the recorders that draw more.
 
-    def __init__(self, recorders: Sequence[Recorder] = ()) -> None:
-        self._recorders = recorders
+    Attributes:
+        drawn: whether the run draws figures.
+    """
+
+    def __init__(self, recorders: Sequence[Recorder] = (), figures: str = "png") -> None:
+        """Begin without a model.
+
+        Raises:
+            RequestError: `figures` is none of `FIGURES`.
+        """
+        self._recorders, self.drawn = recorders, check_figures(figures)
         self._taken: tuple[Scene, Model, Mapping[str, Mesh]] | None = None
 
     def take(self, scene: Scene, model: Model, meshes: Mapping[str, Mesh]) -> None:

@@ -6,6 +6,8 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from warp_mca.base.errors import bad_value
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -15,6 +17,18 @@ BLUE, VERMILION, BLACK = "#0072B2", "#D55E00", "#222222"
 GREEN, SKY, ORANGE, PURPLE = "#009E73", "#56B4E9", "#E69F00", "#CC79A7"
 STICK = "#F0E442"
 DOTS_PER_INCH = 200
+FIGURES = ("png", "none")  # what a run draws
+
+
+def check_figures(value: object) -> bool:
+    """Whether figures are drawn.
+
+    Raises:
+        RequestError: it is none of `FIGURES`.
+    """
+    if value not in FIGURES:
+        raise bad_value("figures", value, f"give one of {', '.join(FIGURES)}")
+    return value != "none"
 
 
 def new_figure(width: float, height: float) -> Figure:

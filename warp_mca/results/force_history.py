@@ -218,13 +218,11 @@ def force_peaks(time: Array, F_n: Array) -> list[Interval]:
 
 def _peak_rows(F_n: Array, rows: Rows, smooth: Array, prominence: float) -> list[int]:
     """Rows of the peaks of one contact that stand out of its `smooth` force by `prominence` [N]."""
-    from scipy.signal import find_peaks
-
     ended = rows[1] < len(F_n)
     # A zero before it lets a force that begins high count as a peak, and one after it a force that ends at once.
-    found, _ = find_peaks(np.pad(smooth, (1, int(ended))), prominence=prominence)
-    found = found - 1
-    if not len(found):
+    # Turns begin with this zero as a valley; the last one may be no turn but the end of the history.
+    found = [row - 1 for row in _turns(np.pad(smooth, (1, int(ended))), prominence)[1:-1:2]]
+    if not found:
         return []
     valleys = [a + int(np.argmin(smooth[a:b])) for a, b in itertools.pairwise(found)]
     last = len(smooth) if ended else int(found[-1] + np.argmin(smooth[found[-1] :]))

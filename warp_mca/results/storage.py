@@ -89,14 +89,17 @@ def save(result: Result, directory: str | os.PathLike[str], *, force: bool = Fal
 
 
 def write(
-    result: Result, folder: Folder, *, force: bool = False, images: Callable[[], Sequence[Image]] = tuple
+    result: Result,
+    folder: Folder,
+    *,
+    force: bool = False,
+    images: Callable[[], Sequence[Image]] = tuple,
+    figures: bool = True,
 ) -> Result:
-    """As `save`, to a folder that is held already; `images` draws those of the bodies for the report."""
-    from warp_mca.results.energy_figure import save_energies
-    from warp_mca.results.force_figure import save_forces
-    from warp_mca.results.path_figures import save_path_figures
-    from warp_mca.results.probe_figure import save_probes
+    """As `save`, to a folder that is held already; `images` draws those of the bodies for the report.
 
+    Without `figures` nothing is drawn, and the report has tables alone.
+    """
     path = folder.path
     try:
         folder.renew()
@@ -105,19 +108,10 @@ def write(
             written = staging / "results"
             written.mkdir()
             begun = time.perf_counter()
-            _write_history(written / "history.csv", result.history)
-            shown = result.impact() if result.summary.get("touched", True) else result  # of many, the first one
-            save_forces(written / "forces.png", shown)
-            save_energies(written / "energies.png", result)
-            if result.contacts:
-                save_contacts(written / "forces.npz", result.time, result.contacts)
-            if result.paths:
-                save_paths(written / "paths.npz", result.time, result.paths)
-                save_path_figures(written, shown)
-            if result.probes or result.sections:
-                save_sensors(written, result.time, result.probes, result.sections)
-                save_probes(written / "probes.png", shown)
-            text = report_html(result, written, images())
+            _write_data(result, written)
+            if figures:
+                _draw_figures(result, written)
+            text = report_html(result, written, images() if figures else ())
             (written / REPORT).write_text(text, encoding="utf-8")
             digests = {file.name: _digest(file) for file in sorted(written.iterdir())}
             result = _with_output_time(result, path, time.perf_counter() - begun)
@@ -128,6 +122,33 @@ def write(
     except OSError as error:
         raise McaError(f"the results could not be written to {path}: {error.strerror or error}") from error
     return result
+
+
+def _write_data(result: Result, folder: Path) -> None:
+    """Write the histories."""
+    _write_history(folder / "history.csv", result.history)
+    if result.contacts:
+        save_contacts(folder / "forces.npz", result.time, result.contacts)
+    if result.paths:
+        save_paths(folder / "paths.npz", result.time, result.paths)
+    if result.probes or result.sections:
+        save_sensors(folder, result.time, result.probes, result.sections)
+
+
+def _draw_figures(result: Result, folder: Path) -> None:
+    """Draw forces, energies, and what there is besides."""
+    from warp_mca.results.energy_figure import save_energies
+    from warp_mca.results.force_figure import save_forces
+    from warp_mca.results.path_figures import save_path_figures
+    from warp_mca.results.probe_figure import save_probes
+
+    shown = result.impact() if result.summary.get("touched", True) else result  # of many, the first one
+    save_forces(folder / "forces.png", shown)
+    save_energies(folder / "energies.png", result)
+    if result.paths:
+        save_path_figures(folder, shown)
+    if result.probes or result.sections:
+        save_probes(folder / "probes.png", shown)
 
 
 def _digest(file: Path) -> str:

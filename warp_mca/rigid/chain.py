@@ -173,7 +173,7 @@ class Chain:
         return np.array([link.centre for link in self.links], dtype=np.float64)
 
     @cached_property
-    def _moments(self) -> tuple[Array, Array]:
+    def moments(self) -> tuple[Array, Array]:
         """First moment [kg m], shape (link_count, 2), and inertia about the inbound hinge [kg m^2] of each link, with
         the mass of all links beyond it put at its outbound hinge."""
         beyond = np.cumsum(self._mass[::-1])[::-1] - self._mass
@@ -194,7 +194,7 @@ class Chain:
     def mass_matrix(self, theta: Array) -> Array:
         """M(theta) [kg m^2], shape (coordinate_count, coordinate_count), float64; [kg m] and [kg] for s."""
         theta = self.angles(theta)
-        first, second = self._moments
+        first, second = self.moments
         w = self._turn(theta, first)
         upper = np.triu(self._turn(theta, self._hinge_out) @ w.T, 1)
         links = upper + upper.T + np.diag(second)
@@ -206,7 +206,7 @@ class Chain:
     def rate_force(self, theta: Array, theta_dot: Array) -> Array:
         """C(theta, theta_dot) [N m], shape (coordinate_count,), float64; [N] for s."""
         theta, theta_dot = self.angles(theta), self.angles(theta_dot)
-        w = self._turn(theta, self._moments[0])
+        w = self._turn(theta, self.moments[0])
         upper = np.triu(self._turn(theta, self._hinge_out) @ perpendicular(w).T, 1)
         links = (upper.T - upper) @ theta_dot**2
         return links if self.slide is None else np.append(-(theta_dot**2) @ w @ np.asarray(self.slide), links)
@@ -219,7 +219,7 @@ class Chain:
         return np.append(along, self._gravity_torques(theta[1:]))
 
     def _gravity_torques(self, theta: Array) -> Array:
-        return perpendicular(self._turn(theta, self._moments[0])) @ np.asarray(self.gravity)
+        return perpendicular(self._turn(theta, self.moments[0])) @ np.asarray(self.gravity)
 
     def acceleration(self, theta: Array, theta_dot: Array, force: Array | None = None) -> Array:
         """theta'' = M^-1 (Q - C - G) [rad/s^2], shape (coordinate_count,), float64, under a generalised force Q."""
@@ -237,7 +237,7 @@ class Chain:
 
     def potential_energy(self, theta: Array) -> float:
         """V = -g . (first moment of the chain about the ground hinge at s = 0) [J]."""
-        fixed = float(-self._turn(self.angles(theta), self._moments[0]).sum(axis=0) @ np.asarray(self.gravity))
+        fixed = float(-self._turn(self.angles(theta), self.moments[0]).sum(axis=0) @ np.asarray(self.gravity))
         return fixed if self.slide is None else fixed - self.mass * theta[0] * float(np.dot(self.gravity, self.slide))
 
     def hinges(self, theta: Array, theta_dot: Array) -> tuple[Array, Array]:
@@ -271,7 +271,7 @@ class Chain:
 
     def _momentum(self, theta: Array, theta_dot: Array, mass: float) -> Array:
         """Linear momentum [kg m/s] where `mass` [kg] moves with the first hinge and the links turn about it."""
-        turning = -self.angles(theta_dot) @ perpendicular(self._turn(self.angles(theta), self._moments[0]))
+        turning = -self.angles(theta_dot) @ perpendicular(self._turn(self.angles(theta), self.moments[0]))
         if self.slide is None and not any(self.origin_velocity):
             return turning
         slide = 0.0 if self.slide is None else theta_dot[0] * np.asarray(self.slide)
@@ -292,7 +292,7 @@ class Chain:
 
         For a base that accelerates at a, pass a chain whose gravity is g - a.
         """
-        w = self._turn(self.angles(theta), self._moments[0])
+        w = self._turn(self.angles(theta), self.moments[0])
         force = -self.angles(theta_ddot) @ perpendicular(w) - self.angles(theta_dot) ** 2 @ w
         slide = 0.0 if self.slide is None else theta_ddot[0] * np.asarray(self.slide)
         return force + self.mass * (slide - np.asarray(self.gravity))

@@ -11,6 +11,7 @@ import numpy as np
 from warp_mca.base.errors import bad_value
 from warp_mca.rigid.chain import Array, Chain
 from warp_mca.rigid.loads import Loads, joint_rates, link_torques
+from warp_mca.rigid.plain_chain import acceleration_of
 
 MAX_TURN = 1e4  # angle through which a chain may turn in a swing [rad]; it takes minutes to compute
 MAX_DECAYS = 1e6  # decay times of joint friction at rest in a swing; it takes minutes to compute
@@ -24,11 +25,13 @@ def flow(chain: Chain, middle: float) -> Callable[[float, Array], Array]:
     """
     count, loads = chain.coordinate_count, chain.loads
     if loads is None:
-        return lambda _t, y: np.concatenate([y[count:], chain.acceleration(y[:count], y[count:])])
+        free = acceleration_of(chain)
+        return lambda _t, y: np.concatenate([y[count:], free(y[:count], y[count:], None)])
     base, local = loads.base_velocity, replace(chain, origin_velocity=(0.0, 0.0))
     if base is not None:
         a = base.slope(middle)
         local = replace(local, gravity=(float(chain.gravity[0] - a[0]), float(chain.gravity[1] - a[1])))
+    accelerated = acceleration_of(local)
 
     def rates_of(t: float, y: Array) -> Array:
         q, v = y[:count], y[count : 2 * count]
@@ -36,7 +39,7 @@ def flow(chain: Chain, middle: float) -> Callable[[float, Array], Array]:
         drive, friction = loads.drive_torques(t), loads.friction_torques(rates)
         force = np.zeros(count)
         chain.angles(force)[:] = link_torques(drive + friction)
-        a = local.acceleration(q, v, force)
+        a = accelerated(q, v, force)
         base_power = 0.0 if base is None else local.base_force(q, v, a) @ base.at(t)
         return np.concatenate([v, a, [drive @ rates, -friction @ rates, base_power]])
 

@@ -14,6 +14,7 @@ from warp_mca.base.rotation import rotation_matrix
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.rigid.chain import Array, Chain, link_axes
 from warp_mca.rigid.placement import Placement
+from warp_mca.rigid.plain_chain import end_point
 from warp_mca.rigid.touch import Gap
 from warp_mca.scene import RigidPlane, Scene, Surface, Tip
 
@@ -37,10 +38,6 @@ class TargetPlane:
     def at(self, t: float) -> tuple[Array, Array]:
         """A point of the plane [m] and its normal [-] at time t [s], each shape (3,), float64."""
         return self.point + t * self.velocity, self.normal
-
-    def gap(self, point: Array, radius: float, t: float) -> float:
-        """(c - p(t)) . n - r [m] for a sphere of that radius [m] around `point` [m] at time t [s]."""
-        return float((point - self.point - t * self.velocity) @ self.normal) - radius
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,12 +132,16 @@ def tip_gap(chain: Chain, tip: Tip, plane: TargetPlane) -> Gap:
     """Distance of the tip's sphere on the last link from the plane [m], a function of time [s] and coordinates."""
     hinge = chain.links[-1].hinge_in
     centre = (tip.centre[0] - hinge[0], tip.centre[1] - hinge[1])
-    last, rest, shift = len(chain.links) - 1, np.zeros(chain.coordinate_count), _base_shift(chain)
+    position, shift = end_point(chain, centre), _base_shift(chain)
+    normal, velocity, start = plane.normal.tolist(), plane.velocity.tolist(), plane.point.tolist()
 
     def gap(t: float, theta: Array) -> float:
-        point, _ = chain.at(last, centre, theta, rest)
-        point = point if shift is None else point + shift(t)
-        return plane.gap(np.array([point[0], point[1], tip.centre[2]]), tip.radius, t)
+        x, y = position(theta)
+        if shift is not None:
+            way = shift(t)
+            x, y = x + float(way[0]), y + float(way[1])
+        away = zip((x, y, tip.centre[2]), start, velocity, normal, strict=True)
+        return sum((c - p - t * v) * n for c, p, v, n in away) - tip.radius
 
     return gap
 

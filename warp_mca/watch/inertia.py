@@ -84,7 +84,10 @@ def raised_inertia(c: Finished, most: float) -> Iterator[Values]:
             if moved.rotation_energy > max(still, TURNING * energy):
                 turns.append((moved, x))
         turns = [(motion, x) for motion, x in turns if _most(motion, mesh) > most]
-        if turns and (excess := max(_excess(body, mesh, model, own, *turn) for turn in turns)) > most:
+        if not turns:
+            continue
+        known = inertias(body, mesh)
+        if (excess := max(_excess(known, mesh, model, own, *turn) for turn in turns)) > most:
             yield dict(body=f"{'rigid ' if body.rigid else ''}body {body.name}", excess=excess)
 
 
@@ -142,12 +145,12 @@ def _most(motion: Motion, mesh: Mesh) -> float:
     return raised / exact if exact > 0.0 else np.inf
 
 
-def _excess(body: Body, mesh: Mesh, model: Model, own: slice, motion: Motion, x: Array) -> float:
+def _excess(known: tuple[Array, Array], mesh: Mesh, model: Model, own: slice, motion: Motion, x: Array) -> float:
     """Share by which lumping raises the inertia about the axis of a motion, at nodes x [m] of the model [-].
 
-    A body that joints hold turns about the nearest of them.
+    A body that joints hold turns about the nearest of them; `known` as of `inertias`.
     """
-    volume, nodes = inertias(body, mesh)
+    volume, nodes = known
     axis = mean_pose(mesh.points, x[own], model.mass[own])[2].T @ motion.rate
     axis /= np.linalg.norm(axis)
     away = np.cross(motion.velocity, motion.rate) / (motion.rate @ motion.rate)  # of the centre from a fixed axis
