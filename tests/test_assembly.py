@@ -12,6 +12,7 @@ from statics import Static
 
 import warp_mca as mca
 from warp_mca.geometry import cad
+from warp_mca.geometry.cad_drawing import plain_name
 from warp_mca.geometry.cad_solids import solid_names
 from warp_mca.geometry.quality import check, volumes
 from warp_mca.geometry.shape_volume import of_cells
@@ -214,6 +215,28 @@ def test_where_one_algorithm_fails_the_next_is_tried(phone: Path, monkeypatch: p
     mesh = mca.Cad(phone, size=5e-3, solids=("glass",)).build()
     assert tried == [10.0, 1.0]
     assert volumes(mesh).sum() == pytest.approx(1e-9 * PHONE["glass"], rel=1e-6)
+
+
+def test_where_all_algorithms_fail_at_the_own_size_fewer_cells_over_a_wall_are_tried(
+    phone: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def failing(part: mca.Cad, algorithms: dict[str, float]) -> mca.Mesh:
+        if part.size is not None or part.across > 0.5:
+            raise cad._MeshingError("it fails")
+        return meshed(part, algorithms)
+
+    meshed = cad._meshed_by
+    monkeypatch.setattr(cad, "_meshed_by", failing)
+    mesh = mca.Cad(phone, across=1.9, solids=("glass",)).build()
+    assert mesh.notes == ("gmsh meshes phone.step with across=0.475 but not with 1.9",)
+    assert volumes(mesh).sum() == pytest.approx(1e-9 * PHONE["glass"], rel=1e-6)
+    with pytest.raises(mca.RequestError, match="it fails"):
+        mca.Cad(phone, size=4.9e-3, solids=("glass",)).build()
+
+
+def test_names_are_without_what_opencascade_adds():
+    assert plain_name("nut & & 256") == "nut"
+    assert [plain_name(label) for label in ("=>[0:1:1:3]", "SOLID", "Open CASCADE STEP 7", "")] == [""] * 4
 
 
 REFUSED = [

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
+from warp_mca.decks.units import Units
 
 CORNERS = [(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)]
 BRICK = (1, 2, 4, 3, 5, 6, 8, 7)
@@ -151,8 +152,16 @@ def test_units_are_asked_for_and_converted(tmp_path: Path):
         assert old in text
         text = text.replace(old, new)
     check_equal(read(tmp_path, text, "kg-mm-ms"), by_hand())
-    with pytest.raises(mca.RequestError, match="units = 'mm': decks name none; give SI, t-mm-s, kg-mm-ms, g-mm-ms"):
+    with pytest.raises(mca.RequestError, match=r"units = 'mm': decks name none; give SI, t-mm-s, .* g-mm-ms, g-cm-us"):
         read(tmp_path, text, "mm")
+
+
+def test_steel_in_grams_centimetres_and_microseconds():
+    units = Units("g-cm-us")
+    assert units.si(7.896, "density") == 7896.0
+    assert units.si(2.1, "stress") == 2.1e11  # Mbar
+    assert units.si(0.1246, "velocity") == 1246.0
+    assert units.length == 0.01
 
 
 def test_files_that_are_included(tmp_path: Path):

@@ -142,6 +142,11 @@ def test_units_suit_the_greatest_value(greatest: float, expected: tuple[float, s
     assert engineering(greatest, "N") == expected
 
 
+def test_accelerations_are_in_kilometres_per_second_squared():
+    assert engineering(6.4e8, "m/s²") == (1e-3, "km/s²")
+    assert engineering(12.0, "m/s²") == (1.0, "m/s²")
+
+
 def test_the_palette_is_viridis():
     from matplotlib import colormaps
 

@@ -247,7 +247,9 @@ def _add_scene(parser: argparse.ArgumentParser, more: str = "") -> None:
     group.add_argument(
         "--refine", type=float, metavar="R", help="cells R times smaller than the recipes say; below 1 larger ones"
     )
-    group.add_argument("--units", metavar="SYSTEM", help="run an LS-DYNA deck, in SI, t-mm-s, kg-mm-ms or g-mm-ms")
+    group.add_argument(
+        "--units", metavar="SYSTEM", help="run an LS-DYNA deck, in SI, t-mm-s, kg-mm-ms, g-mm-ms or g-cm-us"
+    )
     help_text = "change a parameter; once for each"
     _add_element(group, choices=None)  # `--import` may bring more
     _add_import(group)

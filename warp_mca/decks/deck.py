@@ -60,7 +60,7 @@ def read_deck(path: str | Path, units: str, leave_out: Sequence[str] = ()) -> Sc
 
     Args:
         path: of the deck.
-        units: "SI", "t-mm-s", "kg-mm-ms" or "g-mm-ms": masses, lengths and times of the deck.
+        units: "SI", "t-mm-s", "kg-mm-ms", "g-mm-ms" or "g-cm-us": masses, lengths and times of the deck.
         leave_out: keywords to be left out, as patterns, such as "DAMPING_*".
 
     Raises:

@@ -7,7 +7,10 @@ from decimal import Decimal
 
 from warp_mca.base.errors import bad_value
 
-UNITS = {"SI": (0, 0, 0), "t-mm-s": (3, -3, 0), "kg-mm-ms": (0, -3, -3), "g-mm-ms": (-3, -3, -3)}
+UNITS = {
+    **{"SI": (0, 0, 0), "t-mm-s": (3, -3, 0), "kg-mm-ms": (0, -3, -3), "g-mm-ms": (-3, -3, -3)},
+    "g-cm-us": (-3, -2, -6),  # stresses in Mbar
+}
 """Powers of ten of the units of mass [kg], length [m] and time [s] by the name of the system."""
 
 _QUANTITIES = {  # powers of mass, length and time in what cards hold

@@ -24,6 +24,7 @@ from warp_mca.geometry.shape_volume import of_cells
 # gmsh's numbers of its algorithms for tetrahedra and for triangles, tried in turn: HXT makes the fewest slivers,
 # Delaunay's meshes some solids that it cannot.
 _ALGORITHMS = ((10.0, 6.0), (1.0, 6.0), (10.0, 1.0), (1.0, 5.0))
+_FEWER = (0.5, 0.25)  # shares of the cells over a wall that are tried where all algorithms fail
 _MESH, _ELEMENT = 60.0, 1e-4  # time that gmsh may take to mesh any part, and for an element, many times its need [s]
 _KEPT = 32  # meshes that stay in memory, so that a body that is placed on a plane is not meshed twice
 
@@ -124,13 +125,22 @@ def extent(path: str | Path, scale: float | None = None) -> float:
 @lru_cache(maxsize=_KEPT)
 def _meshed(cad: Cad, stamp: tuple[int, int]) -> Mesh:
     """The mesh of a file that was changed last at `stamp`: time [ns] and size [byte]."""
-    for number, (solid, plane) in enumerate(_ALGORITHMS, start=1):
+    tries = [(cad, one) for one in _ALGORITHMS]
+    if cad.size is None:
+        fewer = [cad.across * share for share in _FEWER if cad.across * share >= LEAST_ACROSS]
+        tries += [(replace(cad, across=across), one) for across in fewer for one in _ALGORITHMS[:2]]
+    for number, (part, (solid, plane)) in enumerate(tries, start=1):
         try:
-            return _meshed_by(cad, {"Mesh__Algorithm3D": solid, "Mesh__Algorithm": plane})
+            mesh = _meshed_by(part, {"Mesh__Algorithm3D": solid, "Mesh__Algorithm": plane})
         except _MeshingError as failure:
-            if number == len(_ALGORITHMS):
+            if number == len(tries):
                 with explained(str(cad.path)):
                     raise Exception(str(failure)) from failure  # as gmsh's own errors are
+        else:
+            if part.across == cad.across:
+                return mesh
+            note = f"gmsh meshes {Path(cad.path).name} with across={part.across:g} but not with {cad.across:g}"
+            return replace(mesh, notes=(*mesh.notes, note))
     raise AssertionError  # the last one has returned or raised
 
 
@@ -148,7 +158,7 @@ def _meshed_by(cad: Cad, algorithms: dict[str, float]) -> Mesh:
     path = str(cad.path)
     scale = cad.scale or UNITS[Path(path).suffix.lower()]
     with gmsh_session(reading_time(path), **algorithms) as gmsh, explained(path):
-        draw(gmsh, path)
+        notes = draw(gmsh, path)
         names = chosen_solids(gmsh.model, cad.solids) if cad.solids or cad.glue else {}
         exact = solid_volumes(gmsh, path)
         if cad.glue:
@@ -166,7 +176,8 @@ def _meshed_by(cad: Cad, algorithms: dict[str, float]) -> Mesh:
             if isinstance(error, RequestError) or TOO_LONG in str(error):
                 raise
             raise _MeshingError(str(error)) from error
-        return read_cells(gmsh.model, scale, scale**3 * exact, names)
+        mesh = read_cells(gmsh.model, scale, scale**3 * exact, names)
+        return replace(mesh, notes=(*mesh.notes, *notes))
 
 
 def _sized(gmsh: Any, cad: Cad, scale: float) -> float:

@@ -17,7 +17,9 @@ from warp_mca.base.errors import bad_value
 UNITS = {".step": 1e-3, ".stp": 1e-3, ".iges": 1e-3, ".igs": 1e-3, ".brep": 1.0, ".stl": 1.0}
 _TRIANGLE = 2  # number of the linear triangle in gmsh
 _SHARP = math.radians(40.0)  # angle between triangles of an STL file from which an edge parts two faces
+_BLUNT = math.radians(120.0)  # the same for surfaces whose faces gmsh cannot flatten otherwise
 GENERIC_NAMES = ("COMPOUND", "SOLID", "SHELL", "FACE")  # names that OpenCASCADE gives to what has none
+NO_NAMES = ("Open CASCADE", "=>[")  # so begin others of these, and references to other labels
 _READ, _BYTE = 20.0, 5e-5  # time that gmsh may take to read any file, and for a byte of it, many times its need [s]
 
 
@@ -52,18 +54,18 @@ def explained(path: str) -> Iterator[None]:
         raise bad_value("Cad.path", path, f"gmsh cannot read or mesh it ({words}); {remedy}") from error
 
 
-def draw(gmsh: Any, path: str) -> None:
-    """Reads the part into gmsh's model; sews the faces of a file without solids together."""
+def draw(gmsh: Any, path: str) -> tuple[str, ...]:
+    """Reads the part into gmsh's model; sews the faces of a file without solids together.
+
+    Returns:
+        Sentences on what is drawn otherwise than the file has it.
+    """
     gmsh.merge(path)
+    notes = ()
     if Path(path).suffix.lower() == ".stl":
         _check_closed(gmsh, path)
-        try:
-            _part_faces(gmsh, False)
-        except Exception:  # closed faces, as a whole sphere, cannot be flattened
-            gmsh.model.remove()
-            gmsh.model.add("warp_mca")
-            gmsh.merge(path)
-            _part_faces(gmsh, True)
+        if _part_faces(gmsh, path) == _BLUNT:
+            notes = (f"gmsh cannot part the faces of {Path(path).name}: cells do not follow its sharp edges",)
         faces = [tag for _, tag in gmsh.model.getEntities(2)]
         if faces:
             gmsh.model.geo.addVolume([gmsh.model.geo.addSurfaceLoop(faces)])
@@ -73,6 +75,7 @@ def draw(gmsh: Any, path: str) -> None:
         gmsh.model.occ.synchronize()
     if not gmsh.model.getEntities(3):
         raise bad_value("Cad.path", path, "it holds no solid; save the part as a closed solid")
+    return notes
 
 
 def _check_closed(gmsh: Any, path: str) -> None:
@@ -113,10 +116,24 @@ def _box(points: NDArray) -> NDArray:
     return np.array([points.min(axis=0), points.max(axis=0)])
 
 
-def _part_faces(gmsh: Any, cut: bool) -> None:
-    """Parts the triangles of an STL file along sharp edges, and if `cut`, into pieces that can be flattened."""
-    gmsh.model.mesh.classifySurfaces(_SHARP, True, cut, math.pi)
-    gmsh.model.mesh.createGeometry()
+def _part_faces(gmsh: Any, path: str) -> float:
+    """Part the triangles of an STL file into faces; the angle from which an edge parts two of them.
+
+    Closed faces, as a whole sphere, are also cut into pieces that can be flattened.
+    """
+    ways = ((_SHARP, False), (_SHARP, True), (_BLUNT, True))
+    for number, (angle, cut) in enumerate(ways, start=1):
+        try:
+            gmsh.model.mesh.classifySurfaces(angle, True, cut, math.pi)
+            gmsh.model.mesh.createGeometry()
+            return angle
+        except Exception:
+            if number == len(ways):
+                raise
+            gmsh.model.remove()
+            gmsh.model.add("warp_mca")
+            gmsh.merge(path)
+    raise AssertionError  # the last way has returned or raised
 
 
 def diagonal(gmsh: Any) -> float:
@@ -127,5 +144,10 @@ def diagonal(gmsh: Any) -> float:
 
 def entity_name(model: Any, dim: int, tag: int) -> str:
     """Name of a face or a solid in the file, without those of the assemblies that it lies in; "" without one."""
-    name = model.getEntityName(dim, tag).rpartition("/")[2].strip()
-    return "" if name in GENERIC_NAMES or name.startswith("Open CASCADE") else name
+    return plain_name(model.getEntityName(dim, tag).rpartition("/")[2])
+
+
+def plain_name(label: str) -> str:
+    """A label that gmsh gives, without the further ones that it joins by " & "; "" for one that names nothing."""
+    name = label.partition(" & ")[0].strip()
+    return "" if name in GENERIC_NAMES or name.startswith(NO_NAMES) else name

@@ -13,7 +13,7 @@ import numpy as np
 
 from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
-from warp_mca.geometry.cad_drawing import GENERIC_NAMES, UNITS, draw, explained, reading_time
+from warp_mca.geometry.cad_drawing import UNITS, draw, explained, plain_name, reading_time
 from warp_mca.geometry.gmsh_session import allow, gmsh_session
 
 NEAR = 2e-3  # of the smaller solid's diagonal: solids with a gap up to this are taken to touch [-]
@@ -71,10 +71,9 @@ def solid_names(model: Any) -> dict[int, str]:
     """A name for each solid of gmsh's model, by its tag."""
     found: dict[int, str] = {}
     for number, (_, tag) in enumerate(model.getEntities(3), start=1):
-        # gmsh gives the labels of all assemblies around a solid, and joins further labels of one by " & "
-        words = [word.partition(" & ")[0].strip() for word in model.getEntityName(3, tag).split("/")[1:]]
-        named = [word for word in words if not (word in ("", *GENERIC_NAMES) or word.isdigit())]
-        named = [word for word in named if not word.startswith("Open CASCADE")]
+        # gmsh gives the labels of all assemblies around a solid
+        words = [plain_name(word) for word in model.getEntityName(3, tag).split("/")[1:]]
+        named = [word for word in words if word and not word.isdigit()]
         name = named[-1] if named else f"solid_{number}"
         taken, k = set(found.values()), 1
         while (unique := name if k == 1 else f"{name}_{k}") in taken:

@@ -69,7 +69,12 @@ def save_png(figure: Figure, path: str | os.PathLike[str], dots_per_inch: float 
 
 
 def engineering(greatest: float, unit: str) -> tuple[float, str]:
-    """Factor and unit that bring `greatest` [unit] to a number of few digits: (1e-3, "kN") for 2000 N."""
+    """Factor and unit that bring `greatest` [unit] to a number of few digits: (1e-3, "kN") for 2000 N.
+
+    Metres, and what is measured in them, get no greater prefix than k: nobody reads Mm/s².
+    """
+    if unit.startswith("m") and abs(greatest) >= 1e3:
+        return 1e-3, "k" + unit
     for limit, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m")):
         if abs(greatest) >= limit:
             return 1.0 / limit, prefix + unit
