@@ -95,6 +95,15 @@ SOUND: dict[type, Any] = {
         length=0.1,
         preload=1.0,
     ),
+    mca.Bolt: mca.Bolt(
+        name="b",
+        body="low",
+        at=(0.0, 0.0, 0.0),
+        other="up",
+        other_at=(0.0, 0.01, 0.0),
+        diameter=0.01,
+        reach=0.03,
+    ),
     mca.Slide: mca.Slide(direction=(1.0, 0.0, 0.0), carriage_mass=0.1, velocity=0.1),
     mca.JointTorque: mca.JointTorque(joint="O", times=(0.0, 1.0), torques=(0.0, 1.0)),
 }
@@ -243,6 +252,7 @@ def scene_with(item: Any) -> mca.Scene:
                 mca.Absorbing: "absorbing",
                 mca.Damping: "loads",
                 mca.Spring: "loads",
+                mca.Bolt: "loads",
                 mca.PointMass: "masses",
                 mca.Tie: "ties",
                 mca.Settle: "phases",

@@ -18,6 +18,7 @@ from warp_mca.scene import (
     BaseMotion,
     Body,
     BodyForce,
+    Bolt,
     Bond,
     Contact,
     ContactAll,
@@ -129,6 +130,7 @@ _LAZY = {
 __all__ = [
     "Scene",
     "Body",
+    "Bolt",
     "Bond",
     "Elastic",
     "J2Bilinear",

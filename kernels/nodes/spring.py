@@ -11,6 +11,9 @@ what T itself adds until t(n) counts, by the lightness l of both points (1/m of 
     T (1 + dt l T_d' / 2) = T_s + T_d(speed at n-1/2),
 
 so that a dashpot between two masses sees the mean of the speeds before and after, as central differences want it.
+
+While a bolt is tightened its springs slip: T_s stays 0, and is taken at L - L_0 less this slip ever after. Meanwhile
+the preload grows as s^2 (3 - 2 s) over the share s of its rise, and the work of that on the spring is external.
 """
 
 import warp as wp
@@ -39,6 +42,8 @@ class Springs:
             int32.
         x: elongations [m] and speeds [m/s], float64.
         y: tensions [N], float64.
+        rise: time in which the preload of one that slips grows [s]; 0 for others, shape (spring_count,), float64.
+        tightens: 1 while it is [-], shape (1,), int32.
     """
 
     begin: wp.array(dtype=wp.int32)
@@ -53,6 +58,8 @@ class Springs:
     tables: wp.array(dtype=wp.int32)
     x: wp.array(dtype=wp.float64)
     y: wp.array(dtype=wp.float64)
+    rise: wp.array(dtype=wp.float64)
+    tightens: wp.array(dtype=wp.int32)
 
 
 @wp.struct
@@ -61,11 +68,15 @@ class SpringState:
 
     Attributes:
         energy: stored in each [J], shape (spring_count,), float64.
-        taken: by its dashpot [J], shape (spring_count,), float64.
+        taken: by its dashpot, or given by what tightens a bolt [J], shape (spring_count,), float64.
         tension: T [N], shape (spring_count,), float64.
         elongation: L - L_0 [m], shape (spring_count,), float64.
         damper: tension of its dashpot along n [N], shape (spring_count,), vec3d.
         clock: 1 once it has taken a step [-], shape (spring_count,), int32.
+        slip: elongation at which T_s is taken at 0 [m], shape (spring_count,), float64.
+        pull: T n [N], shape (spring_count,), vec3d.
+        along: n [-], shape (spring_count,), vec3d.
+        turned: time for which it has been tightened [s], shape (spring_count,), float64.
     """
 
     energy: wp.array(dtype=wp.float64)
@@ -74,6 +85,10 @@ class SpringState:
     elongation: wp.array(dtype=wp.float64)
     damper: wp.array(dtype=wp.vec3d)
     clock: wp.array(dtype=wp.int32)
+    slip: wp.array(dtype=wp.float64)
+    pull: wp.array(dtype=wp.vec3d)
+    along: wp.array(dtype=wp.vec3d)
+    turned: wp.array(dtype=wp.float64)
 
 
 @wp.func
@@ -118,6 +133,41 @@ def count_taken(j: int, damper: wp.vec3d, speed: wp.vec3d, dt: wp.float64, state
     state_out.clock[j] = 1
 
 
+@wp.func
+def share_of(turned: wp.float64, rise: wp.float64) -> wp.float64:
+    """Share of the preload [-]; 1 of springs that are none of a bolt."""
+    if rise == wp.float64(0.0):
+        return wp.float64(1.0)
+    s = wp.min(turned / rise, wp.float64(1.0))
+    return s * s * (wp.float64(3.0) - wp.float64(2.0) * s)
+
+
+@wp.func
+def keep_state(
+    j: int,
+    springs: Springs,
+    e: wp.float64,
+    slip: wp.float64,
+    turned: wp.float64,
+    stored: wp.float64,
+    state_out: SpringState,
+):
+    """Keep elongation, slip and energy at t(n), with the work of a growing preload; `stored` is the integral of T_s."""
+    rest = springs.rest[j]
+    rise = springs.rise[j]
+    share = share_of(turned, rise)
+    at_rest = wp.where(rise == wp.float64(0.0), rest, wp.float64(0.0))
+    lowest = table_at(springs.tables[2 * j], springs.tables[2 * j + 1], springs.x, springs.y, at_rest)
+    state_out.energy[j] = share * springs.preload[j] * (e - rest) + stored - lowest[2]
+    if rise > wp.float64(0.0):
+        way = wp.float64(0.5) * (e + state_out.elongation[j]) - rest
+        grown = (share - share_of(state_out.turned[j], rise)) * springs.preload[j]
+        state_out.taken[j] = state_out.taken[j] + grown * way
+    state_out.turned[j] = turned
+    state_out.elongation[j] = e
+    state_out.slip[j] = slip
+
+
 @wp.kernel(enable_backward=False)
 def pull_springs(
     first: wp.array(dtype=wp.int32),
@@ -148,9 +198,16 @@ def pull_springs(
             n = between / wp.max(wp.length(between), wp.float64(LEAST) * wp.abs(springs.length[j]) + wp.float64(1e-300))
         e = wp.dot(n, between) - springs.length[j]
         rate = wp.dot(n, speed)
-        stiff = table_at(springs.tables[2 * j], springs.tables[2 * j + 1], springs.x, springs.y, e)
+        slip = state_out.slip[j]
+        turned = state_out.turned[j]
+        rise = springs.rise[j]
+        if rise > wp.float64(0.0) and springs.tightens[0] > 0:
+            slip = e
+            if keeps:
+                turned += dt
+        stiff = table_at(springs.tables[2 * j], springs.tables[2 * j + 1], springs.x, springs.y, e - slip)
         damp = table_at(springs.tables[2 * j + 1], springs.tables[2 * j + 2], springs.x, springs.y, rate)
-        spring = springs.preload[j] + stiff[0]
+        spring = share_of(turned, rise) * springs.preload[j] + stiff[0]
         T = spring + damp[0]
         if keeps:  # else the speed is that at t = 0
             T /= wp.float64(1.0) + wp.float64(0.5) * dt * springs.lightness[j] * damp[1]
@@ -162,10 +219,30 @@ def pull_springs(
             i = springs.node[k]
             nodal_force_out[i] = nodal_force_out[i] - springs.weight[k] * T * n
         if keeps and lane == 0:
-            rest = springs.rest[j]
-            lowest = table_at(springs.tables[2 * j], springs.tables[2 * j + 1], springs.x, springs.y, rest)
-            state_out.energy[j] = springs.preload[j] * (e - rest) + stiff[2] - lowest[2]
+            keep_state(j, springs, e, slip, turned, stiff[2], state_out)
             state_out.tension[j] = T
-            state_out.elongation[j] = e
+            state_out.pull[j] = T * n
+            state_out.along[j] = n
             count_taken(j, (T - spring) * n, speed, dt, state_out)
         wait_for_block()  # the next spring may share nodes with this one
+
+
+@wp.kernel(enable_backward=False)
+def read_bolts(
+    begin: wp.array(dtype=wp.int32),
+    pull: wp.array(dtype=wp.vec3d),
+    along: wp.array(dtype=wp.vec3d),
+    axial_out: wp.array(dtype=wp.float64),
+    shear_out: wp.array(dtype=wp.float64),
+):
+    """Axial and shear force of bolts, whose springs begin at `begin`; their mean direction is that of the shank."""
+    b = wp.tid()
+    force = wp.vec3d()
+    axis = wp.vec3d()
+    for j in range(begin[b], begin[b + 1]):
+        force += pull[j]
+        axis += along[j]
+    axis = wp.normalize(axis)
+    axial = wp.dot(force, axis)
+    axial_out[b] = axial
+    shear_out[b] = wp.length(force - axial * axis)

@@ -53,12 +53,13 @@ def settle(phase: Settle, impact: Impact, tell: Callable[[float], None]) -> Stre
     speed = float(np.linalg.norm(impact.ready[0].scene.gravity)) * phase.duration
     steps = coarser(fine, model, joined, math.ceil(phase.duration / (joined * fine.interval)), speed)
     impact.take(steps)
-    motion = HalfSteps(impact)
+    motion = HalfSteps(impact, phase.falling)
     motion.slow(0.0)
+    motion.fall()
     greatest = kinetic = 0.0
     quiet = reached = 0
     passed = False
-    while quiet <= reached:
+    while quiet <= reached or state.steps * fine.dt < motion.rise:
         if state.steps >= steps.count - STEPS:
             raise GuardError(
                 f"bodies do not rest after Settle.duration = {phase.duration:g} s: their kinetic energy is still "
@@ -112,8 +113,8 @@ class HalfSteps:
     `stretch_ended`.
     """
 
-    def __init__(self, impact: Impact) -> None:
-        """Bodies that have a velocity now, at the start, wait from now on."""
+    def __init__(self, impact: Impact, falling: bool = False) -> None:
+        """Bodies that have a velocity now, at the start, wait from now on; with `falling` until `fall` is called."""
         self.impact, self.solver, self.state = impact, impact.solver, impact.state
         model = self.solver.model
         self.kept = impact.scene_runs[0].ledger.kept
@@ -123,7 +124,9 @@ class HalfSteps:
         for first, end in zip(sorted(model.node_start.values()), ends, strict=True):
             waiting[first:end] = model.V[first:end].any()
         bodies = np.array([waiting[body.own[0]] for body in model.rigid_bodies], dtype=bool)
-        self.waiting = [waiting, bodies, bodies]
+        self.waiting = self.moving = [waiting, bodies, bodies]
+        self.falling, self.clock = falling, self.state.steps
+        self.rise = self._tighten(True)
         self.now = before, after = self._half_steps()
         self.initial = [0.5 * (a + b) for a, b in zip(before, after, strict=True)]
         rigid = self.state.rigid
@@ -134,8 +137,17 @@ class HalfSteps:
         self.dashpots = [(item.parameters, np.array(item.parameters.numpy())) for item in damped]
         for parameters, _ in self.dashpots:
             parameters.zero_()
-        self.held = Held(self.solver, waiting, bodies)
+        self.held = Held(self.solver, waiting & (not falling), bodies & (not falling))
         self.now = self._half_steps()
+
+    def fall(self) -> None:
+        """Let bodies settle that fall, which have lost their velocity by now; it is theirs again in `release`."""
+        if self.falling:
+            self.waiting, self.places = [np.zeros_like(mask) for mask in self.moving], []
+
+    def _tighten(self, on: bool) -> float:
+        """Let bolts be tightened, or no more; the time that this takes [s]."""
+        return max((getattr(self.solver, kind).tighten(on) for kind in self.solver.model.loads), default=0.0)
 
     def look(self) -> float:
         """Kinetic energy of the bodies that settle, the mean of those half a step before and after [J].
@@ -154,13 +166,29 @@ class HalfSteps:
 
     def slow(self, factor: float) -> None:
         """Let bodies that wait be where they were without velocity, and the others keep a factor of theirs."""
-        wanted = []
-        for before, after, waiting in zip(*self.now, self.waiting, strict=True):
-            wanted.append(np.where(waiting[:, None], 0.0, factor * 0.5 * (before + after)))
-        self._give(wanted, factor != 1.0)
-        for (array, mask), start in zip(self.places, self.start, strict=True):
+        wanted, fallen = [], self._fallen()
+        for before, after, waiting, gained in zip(*self.now, self.waiting, fallen, strict=True):
+            wanted.append(np.where(waiting[:, None], 0.0, factor * (0.5 * (before + after) - gained)))
+        self._give(wanted, factor != 1.0 or any(gained.any() for gained in fallen))
+        for (array, mask), start in zip(self.places, self.start, strict=False):
             if mask.any():
                 array.assign(np.where(mask[:, None], start, array.numpy()))
+
+    def _fallen(self) -> list[Array]:
+        """What gravity has given to velocities and momenta since the last call, where bodies settle without weight.
+
+        Between two calls, a few steps apart, it moves nothing by more than a picometre or so.
+        """
+        model, time = self.solver.model, (self.state.steps - self.clock) * self.impact.steps.dt
+        self.clock = self.state.steps
+        found = [np.zeros_like(array) for array in self.now[0]]
+        if self.falling:
+            role = self.solver.constraints.role
+            free = role.numpy() == 0 if len(role) else slice(None)
+            found[0][free] = time * model.gravity[0]
+            if len(found[1]):
+                found[1][:] = time * np.outer(self.solver.rigid.bodies.mass.numpy(), model.gravity[0])
+        return found
 
     def rest(self, steps: int) -> None:
         """So many steps in which contact forces are summed, as before any row: the first one of the impact has them."""
@@ -177,6 +205,8 @@ class HalfSteps:
         for parameters, values in self.dashpots:
             parameters.assign(values)
         self.held.release()
+        self._tighten(False)
+        self.waiting = self.moving
         kept, state = scene_run.ledger.kept, self.state
         self.look()
         (before, *_), (after, *_) = self.now

@@ -93,6 +93,15 @@ LISTS = (
     ),
     Listed("Impulse of joints", "joint_impulse", (("impulse", (), "N s"),)),
     Listed(
+        "Bolts",
+        "bolts",
+        (
+            *_greatest("greatest tension", "max_force", "N"),
+            *_greatest("least tension", "min_force", "N"),
+            *_greatest("greatest shear force", "max_shear", "N"),
+        ),
+    ),
+    Listed(
         "Springs",
         "springs",
         (

@@ -187,6 +187,21 @@ def spring_extremes(history: Mapping[str, Array]) -> dict[str, Any]:
     return {"springs": found} if found else {}
 
 
+def bolt_extremes(history: Mapping[str, Array]) -> dict[str, Any]:
+    """Greatest and least tension and greatest shear force of each bolt by name, under "bolts"; empty without any."""
+    found: dict[str, Any] = {}
+    for name in (name for name in history if re.fullmatch("bolt_.+_shear_N", name)):
+        bolt = name.removeprefix("bolt_").removesuffix("_shear_N")
+        tension, shear = history[f"bolt_{bolt}_N"], history[name]
+        rows = {"max_force": (tension, tension.argmax()), "min_force": (tension, tension.argmin())}
+        rows["max_shear"] = shear, shear.argmax()
+        found[bolt] = {
+            figure: {"value": float(values[k]), "unit": "N", "time": float(history["time_s"][k])}
+            for figure, (values, k) in rows.items()
+        }
+    return {"bolts": found} if found else {}
+
+
 def summarise(
     history: Mapping[str, Array], facts: Mapping[str, Any], pairs: Sequence[ContactHistory] = ()
 ) -> dict[str, Any]:
@@ -219,6 +234,7 @@ def summarise(
         "sticks": [list(stick) for stick in stick_intervals(time, F_n, history["stick_fraction"])],
         "element_steps_per_s": facts["n_elements"] * facts["n_steps"] / fe_wall if fe_wall > 0.0 else None,
         **spring_extremes(history),
+        **bolt_extremes(history),
         "version": __version__,
         **{key: value for key, value in facts.items() if key not in FACTS},
     }

@@ -15,6 +15,7 @@ UNITS = (
     (r"theta_.+", "rad"),
     (r"spring_.+_N", "N"),
     (r"spring_.+_m", "m"),
+    (r"bolt_.+_N", "N"),
     (r"joint_.+_N", "N"),
     (r"joint_.+_Nm", "N m"),
     (r"joint_.+_rad", "rad"),

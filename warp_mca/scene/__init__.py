@@ -8,6 +8,7 @@ from warp_mca.scene.absorbing import Absorbing
 from warp_mca.scene.amplitude import Amplitude
 from warp_mca.scene.articulations import Articulation, Cylindrical, Universal
 from warp_mca.scene.bodies import Body, Vec3
+from warp_mca.scene.bolts import Bolt
 from warp_mca.scene.bonds import Bond
 from warp_mca.scene.contact_laws import DampedPenalty, Penalty
 from warp_mca.scene.contacts import OVERLAP_CHOICES, Contact, ContactAll, RigidPlane, Surface
@@ -33,6 +34,7 @@ __all__ = [
     "BaseMotion",
     "Body",
     "BodyForce",
+    "Bolt",
     "Bond",
     "Contact",
     "ContactAll",

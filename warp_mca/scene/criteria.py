@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
+from warp_mca.scene.bolts import Bolt
 from warp_mca.scene.contacts import contact_names
 from warp_mca.scene.sensors import check_class
 from warp_mca.scene.springs import Spring
@@ -34,6 +35,7 @@ FIGURES: dict[str, dict[str, str]] = {
     "sections": {"F_max": "N", "M_max": "N m"},
     "contacts_by_pair": {"F_max": "N"},
     "joints": {"max_force": "N", "max_moment": "N m"},
+    "bolts": {"max_force": "N", "min_force": "N", "max_shear": "N"},
     "springs": {"force_min": "N", "force_max": "N", "elongation_min": "m", "elongation_max": "m"},
     "bonds": {"failed": ""},
     "failure": {"elements": ""},
@@ -153,6 +155,7 @@ def _names(scene: Scene, figure: str) -> list[str]:
         "sections": [section.name for section in scene.sections],
         "contacts_by_pair": names,
         "joints": [joint.name for joint in scene.joints if joint.whole() is not None],
+        "bolts": [load.name for load in scene.loads if isinstance(load, Bolt)],
         "springs": [load.name for load in scene.loads if isinstance(load, Spring)],
         "bonds": [name for name, own in zip(names, scene.contacts, strict=True) if getattr(own, "bond", None)],
         "failure": scene.failing,

@@ -18,10 +18,11 @@ from warp_mca.base.rotation import rotation_matrix
 from warp_mca.scene import library
 from warp_mca.scene.absorbing import Absorbing
 from warp_mca.scene.bodies import Body, Vec3
+from warp_mca.scene.bolts import Bolt
 from warp_mca.scene.cad_assembly import Assembly
 from warp_mca.scene.contacts import Contact, ContactAll, RigidPlane, Surface
 from warp_mca.scene.elastic import Elastic
-from warp_mca.scene.phases import ImpactPhase
+from warp_mca.scene.phases import ImpactPhase, Settle
 from warp_mca.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -40,6 +41,7 @@ FLOORS: dict[str, Elastic | None] = {
     "wood": library.RED_OAK,
 }
 GAP = 1e-6  # between the lowest node and the floor at the start [m]
+_SWELLING = 1e-4  # of the diagonal of the parts: more of it, into which bolts may press them before the fall [-]
 _SPEED, _PASSES, _ROWS = 5000.0, 20, 400  # of waves in metals [m/s], along the parts in a run, intervals of output
 _WIDTH, _DEPTH, _CELLS = 1.25, 0.45, 20  # of a real floor over the diagonal of the parts [-], cells along its width
 _ANGLES = re.compile(r"([^/]+)/([^/]+)")
@@ -90,7 +92,8 @@ def drop_test(
     extent = _extent(bodies)
     turn = pose_rotation(pose, extent)
     down: Vec3 = (0.0, 0.0, -gravity)
-    placed = tuple(body.drop(height, down) for body in _placed(bodies, turn))
+    gap, more = _settled(more, extent)
+    placed = tuple(body.drop(height, down) for body in _placed(bodies, turn, gap))
     duration = _PASSES * extent.diagonal / _SPEED
     floor = _floor(onto, extent.diagonal)
     sides = tuple(Absorbing(body="floor", nodes=side, centre=(0.0, 0.0, 0.0)) for side in _OPEN) if floor else ()
@@ -104,6 +107,13 @@ def drop_test(
         parameters={"height": float(height), "pose": pose, "onto": onto},
         **more,
     )
+
+
+def _settled(more: dict[str, Any], extent: Extent) -> tuple[float, dict[str, Any]]:
+    """Gap to the floor [m], and the fields of a scene, whose bolts are tightened before the impact."""
+    if not any(isinstance(load, Bolt) and load.preload for load in more.get("loads", ())):
+        return GAP, more
+    return GAP + _SWELLING * extent.diagonal, {"phases": (Settle(falling=True),), **more}
 
 
 def _check(bodies: Sequence[Body], contacts: Sequence[object], onto: str, more: Mapping[str, object]) -> None:
@@ -235,8 +245,8 @@ def _mass(body: Body, mesh: Mesh) -> tuple[float, Array]:
     return mass, np.nansum(weight[:, None] * middle, axis=0) / mass
 
 
-def _placed(bodies: Sequence[Body], turn: Array) -> list[Body]:
-    """Bodies turned about the origin, then moved so that the lowest node of all is above z = 0, the middle on z."""
+def _placed(bodies: Sequence[Body], turn: Array, gap: float) -> list[Body]:
+    """Bodies turned about the origin, then moved so that the lowest node is `gap` [m] above z = 0, the middle on z."""
     from scipy.spatial.transform import Rotation
 
     turned, lows, highs = [], [], []
@@ -248,7 +258,7 @@ def _placed(bodies: Sequence[Body], turn: Array) -> list[Body]:
         highs.append(points.max(axis=0))
         turned.append((body, rotation, position))
     low, high = np.min(lows, axis=0), np.max(highs, axis=0)
-    shift = np.array([*(-0.5 * (low + high)[:2]), GAP - low[2]])
+    shift = np.array([*(-0.5 * (low + high)[:2]), gap - low[2]])
     return [
         replace(
             body,

@@ -171,20 +171,25 @@ class Settle:
 
     Bodies without an initial velocity move until they rest; those that have one wait where they are, and take it when
     the impact begins. The others are damped in proportion to mass, and the ledger books that energy as `damping`.
+    A `Bolt` is tightened meanwhile.
 
     Attributes:
         duration: the run stops if they do not rest by then [s].
         tolerance: they rest when their kinetic energy has stayed below this share of its greatest value for as long as
             they took to reach that [-].
+        falling: bodies with an initial velocity do not wait: they settle without it and take it when the impact begins.
+            Nothing has weight meanwhile, as in free fall. For parts with bolts that fall on a floor out of their reach.
     """
 
     duration: float = 0.1
     tolerance: float = 1e-6
+    falling: bool = False
 
     def __post_init__(self) -> None:
         validate.plain(self)
         validate.times("Settle", duration=self.duration)
         validate.within("Settle", 1e-14, 0.1, tolerance=self.tolerance)
+        validate.flags("Settle", falling=self.falling)
 
 
 # That `Scene.phases` may hold: others have a method advance(impact, tell) that returns a `phases.stretch.Stretch`.

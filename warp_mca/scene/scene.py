@@ -12,6 +12,7 @@ from warp_mca.base.errors import bad_value
 from warp_mca.scene.absorbing import Absorbing
 from warp_mca.scene.articulations import check_whole
 from warp_mca.scene.bodies import Body, Vec3
+from warp_mca.scene.bolts import check_bolts
 from warp_mca.scene.contacts import Contact, ContactAll, RigidPlane, Surface
 from warp_mca.scene.criteria import check_criteria
 from warp_mca.scene.drives import Fixed, Prescribed
@@ -143,6 +144,7 @@ class Scene:
             if body not in names:
                 raise bad_value(field_name, body, f"the scene's bodies are {', '.join(names)}")
         check_whole(self)
+        check_bolts(self)
         if self.general and not self.general_pairs():
             remedy = "no pair is left to it: bodies are listed, bound to each other, excluded or rigid; leave it out"
             raise bad_value("Scene.contacts", "ContactAll", remedy)

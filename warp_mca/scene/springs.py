@@ -62,10 +62,7 @@ class Spring(Load):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        validate.texts("Spring", name=self.name)
-        if self.name.splitlines() != [self.name] or set(self.name) & {",", '"'}:
-            remedy = "columns have it; give a word, or some in one line without commas and quotation marks"
-            raise bad_value("Spring.name", self.name, remedy)
+        check_column("Spring", self.name)
         validate.within(self.title, 0.0, 1e15, stiffness=self.stiffness, damping=self.damping)
         validate.within(self.title, -1e15, 1e15, preload=self.preload)
         self._check_points()
@@ -150,6 +147,18 @@ class Spring(Load):
         if self.other is not None and self.other_nodes is not None:
             found["other_nodes"] = (self.other, self.other_nodes, False)
         return found
+
+
+def check_column(kind: str, name: str) -> None:
+    """Refuse names that columns of a table cannot have.
+
+    Raises:
+        RequestError: it is such a name.
+    """
+    validate.texts(kind, name=name)
+    if name.splitlines() != [name] or set(name) & {",", '"'}:
+        remedy = "columns have it; give a word, or some in one line without commas and quotation marks"
+        raise bad_value(f"{kind}.name", name, remedy)
 
 
 LOADS[Spring.__name__] = Spring

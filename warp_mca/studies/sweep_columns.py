@@ -15,10 +15,11 @@ FIGURES = (
 ).split()
 # Lists and objects there, but `penalty`, whose figures are all named after a contact.
 OTHERS = (
-    "F_n_peaks absorbed_impulse accuracy bodies bonds carriage configuration contact_spring_loss contact_spring_share "
-    "contacts contacts_by_pair criteria energy extremes failure files flexible_bodies handoff_mismatch joint_impulse "
-    "joints mass_added mass_scaling parameters path_headings phases probes rate_groups rigid_bodies sections springs "
-    "sticks theta theta_dot ties units wave_speeds"
+    "F_n_peaks absorbed_impulse accuracy bodies bolts bonds carriage configuration contact_spring_loss "
+    "contact_spring_share contacts contacts_by_pair criteria energy extremes failure files flexible_bodies "
+    "handoff_mismatch joint_impulse joints mass_added mass_scaling parameters "
+    "path_headings phases probes rate_groups rigid_bodies sections "
+    "springs sticks theta theta_dot ties units wave_speeds"
 ).split()
 PREFIX = "parameter."
 RESERVED = frozenset((*OWN, *FIGURES, *OTHERS))

@@ -43,6 +43,8 @@ class NodalLoad(Actor):
         counts = self.counts()
         self.count, self.most = int(counts.sum()), int(counts.max())
         self.first = wp.array(offsets(counts.tolist()), dtype=wp.int32)
+        own = np.bincount([item.scene for item in self.items], minlength=solver.layout.count)
+        self.first_item, self.most_items = wp.array(offsets(own.tolist()), dtype=wp.int32), int(own.max())
 
     def entries(self, item: Any) -> int:
         """How many numbers hold the energies of a load."""
@@ -68,6 +70,10 @@ class NodalLoad(Actor):
     def readings_of(self, state: State) -> Sequence[wp.array]:
         """Of each of `Load.readings` at t(n), an entry for each load, shape (len(items),), float64."""
         return []
+
+    def tighten(self, on: bool) -> float:
+        """Whether a phase before the impact brings on preloads, from now on; how long that takes [s]."""
+        return 0.0
 
     def feel(self, state: State, ahead: State, way: Array) -> None:
         """Count the energy over a way [m] of each node, shape (node_count, 3), that a change of velocities hid.
@@ -95,6 +101,6 @@ class NodalLoad(Actor):
             self.solver.records.sum_runs(sum_entries, self.most, [self.column + k, self.first, entry])
         column = self.column + len(self.energies_of(step.state))
         for entry in self.readings_of(step.state):
-            inputs = [self.work.row, column, self.first, entry]
+            inputs = [self.work.row, column, self.first_item, entry]
             wp.launch(list_entries, len(entry), inputs=inputs, outputs=[self.work.partial])
-            column += self.most
+            column += self.most_items

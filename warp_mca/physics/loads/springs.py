@@ -41,6 +41,7 @@ class SpringNodes(LoadedNodes):
         preload: tension at that length [N].
         rest: elongation without tension, at which no energy is stored [m]; 0 where there is none.
         table, damper: of tension over elongation [m], [N], and over its speed [m/s], [N], shape (2, count), float64.
+        rise: time in which the preload of a bolt's spring grows, which slips meanwhile [s]; 0 for others.
     """
 
     middle: int = field(metadata=AS_IS)
@@ -55,6 +56,12 @@ class SpringNodes(LoadedNodes):
     rest: float = field(metadata=AS_IS)
     table: Array = field(metadata=AS_IS)
     damper: Array = field(metadata=AS_IS)
+    rise: float = field(default=0.0, metadata=AS_IS)
+
+    @property
+    def bars(self) -> tuple[SpringNodes, ...]:
+        """The springs that it is made of: itself."""
+        return (self,)
 
     def eigenvalues(self, mass: Array) -> Array:
         """k l at nodes of flexible bodies; of rigid ones WHOLE times the stiffness that each node has of the spring."""
@@ -89,7 +96,7 @@ def build(load: Spring, assembly: Bodies) -> SpringNodes:
         raise bad_value(f"{load.title}.direction", None, "its points lie in one place; give the direction of its force")
     k, c = (_steepest(np.array(table)) for table in (load.table, load.damper))
     bodies = [load.body, *([] if load.other is None else [load.other])]
-    own = [_lightness(assembly, body, *end, n) for body, end in zip(bodies, ends, strict=True)]
+    own = [lightness(assembly, body, *end, n) for body, end in zip(bodies, ends, strict=True)]
     node, weight = (np.concatenate(parts) for parts in zip(*ends, strict=True))
     added, decay = [], []
     for body, (nodes, share), light in zip(bodies, ends, own, strict=True):
@@ -130,7 +137,7 @@ def _point(
     return own + first, np.bincount(which, weight).astype(np.float64)
 
 
-def _lightness(assembly: Bodies, body: str, node: Index, weight: Array, n: Array) -> float:
+def lightness(assembly: Bodies, body: str, node: Index, weight: Array, n: Array) -> float:
     """Acceleration of a point along n per force on it [1/kg]: of nodes by themselves, or of a rigid body."""
     if not assembly.scene.body(body).rigid:
         return float((weight**2 / assembly.mass[node]).sum())

@@ -28,11 +28,15 @@ class SpringsState:
 
     Attributes:
         energy: stored in each at t(n) [J], shape (count,), float64.
-        taken: by its dashpot up to t(n) [J], shape (count,), float64.
+        taken: by its dashpot, or given by what tightens a bolt, up to t(n) [J], shape (count,), float64.
         tension: T then [N], shape (count,), float64.
         elongation: L - L_0 then [m], shape (count,), float64.
         damper: tension of the dashpot along the spring then [N], shape (count,), vec3d.
         clock: 1 once a spring has taken a step [-], shape (count,), int32.
+        slip: elongation of a bolt's springs when it was tightened [m], shape (count,), float64.
+        pull: T n then [N], shape (count,), vec3d.
+        along: n then [-], shape (count,), vec3d.
+        turned: time for which it has been tightened [s], shape (count,), float64.
     """
 
     energy: wp.array
@@ -41,6 +45,10 @@ class SpringsState:
     elongation: wp.array
     damper: wp.array
     clock: wp.array
+    slip: wp.array
+    pull: wp.array
+    along: wp.array
+    turned: wp.array
 
 
 class SpringsStage(NodalLoad):
@@ -49,31 +57,39 @@ class SpringsStage(NodalLoad):
     def __init__(self, solver: System, name: str) -> None:
         """Allocate on the current device."""
         super().__init__(solver, name)
-        items, own = self.items, spring.Springs()
+        self.bars = items = [bar for item in self.items for bar in item.bars]
+        own = spring.Springs()
         counts = [n for item in items for n in (item.middle, len(item.node) - item.middle)]
         own.begin = wp.array(offsets(counts), dtype=wp.int32)
         own.node = wp.array(np.concatenate([item.node for item in items]), dtype=wp.int32)
         own.weight = wp.array(np.concatenate([item.weight for item in items]), dtype=wp.float64)
         for key in ("ground", "direction"):
             setattr(own, key, wp.array([getattr(item, key) for item in items], dtype=wp.vec3d))
-        for key in ("length", "preload", "rest", "lightness"):
+        for key in ("length", "preload", "rest", "lightness", "rise"):
             setattr(own, key, wp.array([getattr(item, key) for item in items], dtype=wp.float64))
         tables = [table for item in items for table in (item.table, item.damper)]
         own.tables = wp.array(offsets([table.shape[1] for table in tables]), dtype=wp.int32)
         joined = np.concatenate(tables, axis=1)
         own.x, own.y = wp.array(joined[0], dtype=wp.float64), wp.array(joined[1], dtype=wp.float64)
+        own.tightens = wp.zeros(1, dtype=wp.int32)
         self.springs, self.scenes, self.dt = own, solver.layout.count, solver.common_dt
         self.lanes = BLOCK if wp.get_device().is_cuda else 1
 
     def entries(self, item: Any) -> int:
         """One for each spring."""
-        return 1
+        return len(item.bars)
+
+    def tighten(self, on: bool) -> float:
+        """Springs of bolts slip from now on, or no more; the longest rise of their preloads."""
+        self.springs.tightens.fill_(int(on))
+        return max(bar.rise for bar in self.bars)
 
     def new_state(self) -> SpringsState:
         """State before the first step, on the current device."""
-        numbers = {key: wp.zeros(self.count, dtype=wp.float64) for key in ("energy", "taken", "tension", "elongation")}
-        vectors, clock = wp.zeros(self.count, dtype=wp.vec3d), wp.zeros(self.count, dtype=wp.int32)
-        return SpringsState(**numbers, damper=vectors, clock=clock)
+        keys = ("energy", "taken", "tension", "elongation", "slip", "turned")
+        numbers = {key: wp.zeros(self.count, dtype=wp.float64) for key in keys}
+        vectors = {key: wp.zeros(self.count, dtype=wp.vec3d) for key in ("damper", "pull", "along")}
+        return SpringsState(**numbers, **vectors, clock=wp.zeros(self.count, dtype=wp.int32))
 
     def record_kernels(self) -> list[Any]:
         """Those of a step, which have blocks of Warp's own size."""
@@ -93,7 +109,7 @@ class SpringsStage(NodalLoad):
         own = state.parts[self.name]
         tension = 0.5 * (own.damper.numpy() + ahead.parts[self.name].damper.numpy())
         moved = np.zeros((self.count, 3))
-        for k, item in enumerate(self.items):
+        for k, item in enumerate(self.bars):
             parts = item.weight[:, None] * way[item.node]
             moved[k] = parts[item.middle :].sum(axis=0) - parts[: item.middle].sum(axis=0)
         own.taken.assign(own.taken.numpy() + (tension * moved).sum(axis=1))
