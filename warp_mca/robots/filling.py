@@ -41,7 +41,7 @@ def cells_behind(name: str, points: Array, faces: Index) -> tuple[Array, Index]:
     if np.einsum("ij,ij->i", a - points[0], np.cross(b - points[0], c - points[0])).sum() <= 0.0:
         raise bad_value("Robot: geom", name, "its surface faces inwards; turn its triangles over")
     across = np.cross(b - a, c - a)
-    twice = np.linalg.norm(across, axis=1, keepdims=True)
+    twice = np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
     behind = (a + b + c) / 3.0 - DEPTH * np.sqrt(0.5 / twice) * across
     apexes = np.arange(len(points), len(points) + len(faces), dtype=np.int32)
     return behind, np.concatenate([apexes[:, None], faces], axis=1).astype(np.int32)
