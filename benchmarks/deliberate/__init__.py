@@ -183,9 +183,9 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "rate_force_reversed": Mutation(
         "centrifugal forces of the rigid chain have the wrong sign",
-        "warp_mca/rigid/chain.py",
-        "(upper.T - upper) @ theta_dot**2",
-        "(upper - upper.T) @ theta_dot**2",
+        "warp_mca/rigid/plain_chain.py",
+        "turning = uy * wx - ux * wy",
+        "turning = ux * wy - uy * wx",
     ),
     "hand_off_spins_backwards": Mutation(
         "nodes take the link's angular velocity with the wrong sign at hand-off",
@@ -200,10 +200,10 @@ MUTATIONS: dict[str, Mutation] = {
         "vibration_energy=float(energy)",
     ),
     "far_links_weightless": Mutation(
-        "a link of the rigid chain does not carry the weight of the links beyond it",
-        "warp_mca/rigid/chain.py",
-        "return perpendicular(self._turn(theta, self._moments[0])) @ np.asarray(self.gravity)",
-        "return perpendicular(self._turn(theta, self._mass[:, None] * self._centre)) @ np.asarray(self.gravity)",
+        "inner links of the rigid chain carry half of the weight that they have with those beyond",
+        "warp_mca/rigid/plain_chain.py",
+        "needed = [wx * gy - wy * gx for wx, wy in w]",
+        "needed = [(0.5 if i + 1 < count else 1.0) * (wx * gy - wy * gx) for i, (wx, wy) in enumerate(w)]",
     ),
     "pressure_varies_within_elements": Mutation(
         "each integration point adds a tenth of its own pressure to that of the element",
