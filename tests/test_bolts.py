@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -131,9 +132,10 @@ def clamped(**change: Any) -> mca.Scene:
     return replace(made, **change)
 
 
-def test_the_impact_begins_with_its_preload():
+@pytest.mark.parametrize("device", ["cpu", pytest.param("cuda:0", marks=pytest.mark.gpu)])
+def test_the_impact_begins_with_its_preload(device: str):
     """The joint presses with it; the plates' own elasticity takes nothing of it."""
-    result = mca.run(clamped(), device="cpu")
+    result = mca.run(clamped(), device=device)
     impact = result.time >= 0.0
     assert result["bolt_screw_N"][impact] == pytest.approx(SCREW.preload, rel=2e-3)
     assert result.contacts[0].pressure[impact] == pytest.approx(SCREW.preload, rel=0.01)
@@ -164,6 +166,32 @@ def test_its_preload_is_back_after_an_impact():
     assert result.summary["energy_error"] < 1e-2
     told = {item["criterion"]: item["value"] for item in result.summary["criteria"]}
     assert told["max_force(screw) < 2100"] == pytest.approx(force.max())
+
+
+def test_a_tightened_bolt_goes_on_from_a_saved_state(tmp_path: Path):
+    """The lengths of its springs, which tightening sets, are part of the State."""
+    impact = begun(clamped())
+    impact.solver.Bolt.tighten(True)
+    impact.advance(until=impact.steps.count // 2)
+    impact.solver.Bolt.tighten(False)
+    impact.save(tmp_path / "middle.state")
+    impact.advance()
+    later = begun(clamped())
+    later.load(tmp_path / "middle.state")
+    later.advance()
+    assert later.state.differences(impact.state) == []
+    assert result_of(later)["bolt_screw_N"][-1] > 0.1 * SCREW.preload
+
+
+def test_a_batch_gives_each_scene_its_bolts():
+    scenes = [
+        scene((BLOCK, replace(OTHER, velocity=(0.0, 0.0, v))), replace(BOLT, diameter=d), span=2e-5)
+        for v, d in ((1.0, D), (2.0, 2.0 * D))
+    ]
+    for result, one in zip(mca.run_batch(scenes), scenes, strict=True):
+        alone = mca.run(one)
+        for name in ("bolt_bolt1_N", "E_spring"):
+            np.testing.assert_allclose(result[name], alone[name], rtol=5e-3, atol=5e-3 * np.abs(alone[name]).max())
 
 
 REFUSED = [

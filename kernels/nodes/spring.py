@@ -11,9 +11,6 @@ what T itself adds until t(n) counts, by the lightness l of both points (1/m of 
     T (1 + dt l T_d' / 2) = T_s + T_d(speed at n-1/2),
 
 so that a dashpot between two masses sees the mean of the speeds before and after, as central differences want it.
-
-While a bolt is tightened its springs slip: T_s stays 0, and is taken at L - L_0 less this slip ever after. Meanwhile
-the preload grows as s^2 (3 - 2 s) over the share s of its rise, and the work of that on the spring is external.
 """
 
 import warp as wp
@@ -34,16 +31,13 @@ class Springs:
         weight: w of each [-], shape (entry_count,), float64.
         ground: place of second points without nodes [m], shape (spring_count,), vec3d.
         direction: n where it stays as it is, else zero [-], shape (spring_count,), vec3d.
-        length: L_0 [m], shape (spring_count,), float64.
-        preload: tension at L_0 beside that of the table [N], shape (spring_count,), float64.
         rest: elongation at which no energy is stored [m], shape (spring_count,), float64.
+        lowest: integral of T_s there [J], shape (spring_count,), float64.
         lightness: l [1/kg], shape (spring_count,), float64.
         tables: first entry of T_s and T_d of each in `x` and `y`, and the number of all, shape (2 spring_count + 1,),
             int32.
         x: elongations [m] and speeds [m/s], float64.
         y: tensions [N], float64.
-        rise: time in which the preload of one that slips grows [s]; 0 for others, shape (spring_count,), float64.
-        tightens: 1 while it is [-], shape (1,), int32.
     """
 
     begin: wp.array(dtype=wp.int32)
@@ -51,15 +45,12 @@ class Springs:
     weight: wp.array(dtype=wp.float64)
     ground: wp.array(dtype=wp.vec3d)
     direction: wp.array(dtype=wp.vec3d)
-    length: wp.array(dtype=wp.float64)
-    preload: wp.array(dtype=wp.float64)
     rest: wp.array(dtype=wp.float64)
+    lowest: wp.array(dtype=wp.float64)
     lightness: wp.array(dtype=wp.float64)
     tables: wp.array(dtype=wp.int32)
     x: wp.array(dtype=wp.float64)
     y: wp.array(dtype=wp.float64)
-    rise: wp.array(dtype=wp.float64)
-    tightens: wp.array(dtype=wp.int32)
 
 
 @wp.struct
@@ -68,15 +59,11 @@ class SpringState:
 
     Attributes:
         energy: stored in each [J], shape (spring_count,), float64.
-        taken: by its dashpot, or given by what tightens a bolt [J], shape (spring_count,), float64.
+        taken: by its dashpot [J], shape (spring_count,), float64.
         tension: T [N], shape (spring_count,), float64.
         elongation: L - L_0 [m], shape (spring_count,), float64.
         damper: tension of its dashpot along n [N], shape (spring_count,), vec3d.
         clock: 1 once it has taken a step [-], shape (spring_count,), int32.
-        slip: elongation at which T_s is taken at 0 [m], shape (spring_count,), float64.
-        pull: T n [N], shape (spring_count,), vec3d.
-        along: n [-], shape (spring_count,), vec3d.
-        turned: time for which it has been tightened [s], shape (spring_count,), float64.
     """
 
     energy: wp.array(dtype=wp.float64)
@@ -85,10 +72,6 @@ class SpringState:
     elongation: wp.array(dtype=wp.float64)
     damper: wp.array(dtype=wp.vec3d)
     clock: wp.array(dtype=wp.int32)
-    slip: wp.array(dtype=wp.float64)
-    pull: wp.array(dtype=wp.vec3d)
-    along: wp.array(dtype=wp.vec3d)
-    turned: wp.array(dtype=wp.float64)
 
 
 @wp.func
@@ -134,44 +117,29 @@ def count_taken(j: int, damper: wp.vec3d, speed: wp.vec3d, dt: wp.float64, state
 
 
 @wp.func
-def share_of(turned: wp.float64, rise: wp.float64) -> wp.float64:
-    """Share of the preload [-]; 1 of springs that are none of a bolt."""
-    if rise == wp.float64(0.0):
-        return wp.float64(1.0)
-    s = wp.min(turned / rise, wp.float64(1.0))
-    return s * s * (wp.float64(3.0) - wp.float64(2.0) * s)
+def between_ends(j: int, lane: int, springs: Springs, X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d)):
+    """Way from the first to the second point of spring j [m]; all threads of the block get it."""
+    way = ends_of(j, lane, springs, X) + ends_of(j, lane, springs, u)
+    if springs.begin[2 * j + 2] == springs.begin[2 * j + 1]:
+        way += springs.ground[j]
+    return way
 
 
 @wp.func
-def keep_state(
-    j: int,
-    springs: Springs,
-    e: wp.float64,
-    slip: wp.float64,
-    turned: wp.float64,
-    stored: wp.float64,
-    state_out: SpringState,
-):
-    """Keep elongation, slip and energy at t(n), with the work of a growing preload; `stored` is the integral of T_s."""
-    rest = springs.rest[j]
-    rise = springs.rise[j]
-    share = share_of(turned, rise)
-    at_rest = wp.where(rise == wp.float64(0.0), rest, wp.float64(0.0))
-    lowest = table_at(springs.tables[2 * j], springs.tables[2 * j + 1], springs.x, springs.y, at_rest)
-    state_out.energy[j] = share * springs.preload[j] * (e - rest) + stored - lowest[2]
-    if rise > wp.float64(0.0):
-        way = wp.float64(0.5) * (e + state_out.elongation[j]) - rest
-        grown = (share - share_of(state_out.turned[j], rise)) * springs.preload[j]
-        state_out.taken[j] = state_out.taken[j] + grown * way
-    state_out.turned[j] = turned
-    state_out.elongation[j] = e
-    state_out.slip[j] = slip
+def direction_of(j: int, springs: Springs, between: wp.vec3d, length: wp.float64) -> wp.vec3d:
+    """Along which spring j acts: n."""
+    n = springs.direction[j]
+    if wp.length_sq(n) == wp.float64(0.0):
+        n = between / wp.max(wp.length(between), wp.float64(LEAST) * wp.abs(length) + wp.float64(1e-300))
+    return n
 
 
 @wp.kernel(enable_backward=False)
 def pull_springs(
     first: wp.array(dtype=wp.int32),
     springs: Springs,
+    length: wp.array(dtype=wp.float64),
+    preload: wp.array(dtype=wp.float64),
     X: wp.array(dtype=wp.vec3d),
     u: wp.array(dtype=wp.vec3d),
     v: wp.array(dtype=wp.vec3d),
@@ -182,32 +150,21 @@ def pull_springs(
 ):
     """Add the forces of springs; a block of threads takes the springs of a scene in turn, which may share nodes.
 
-    With `keeps`, their state at t(n) is kept: energy, what dashpots took, tension and elongation.
+    `length` is L_0 [m] of each, `preload` its tension there beside that of the table [N]. With `keeps`, their state at
+    t(n) is kept: energy, what dashpots took, tension and elongation.
     """
     scene, lane = wp.tid()
     for j in range(first[scene], first[scene + 1]):
         begin = springs.begin[2 * j]
         middle = springs.begin[2 * j + 1]
         end = springs.begin[2 * j + 2]
-        between = ends_of(j, lane, springs, X) + ends_of(j, lane, springs, u)
+        between = between_ends(j, lane, springs, X, u)
         speed = ends_of(j, lane, springs, v)
-        if end == middle:
-            between += springs.ground[j]
-        n = springs.direction[j]
-        if wp.length_sq(n) == wp.float64(0.0):
-            n = between / wp.max(wp.length(between), wp.float64(LEAST) * wp.abs(springs.length[j]) + wp.float64(1e-300))
-        e = wp.dot(n, between) - springs.length[j]
-        rate = wp.dot(n, speed)
-        slip = state_out.slip[j]
-        turned = state_out.turned[j]
-        rise = springs.rise[j]
-        if rise > wp.float64(0.0) and springs.tightens[0] > 0:
-            slip = e
-            if keeps:
-                turned += dt
-        stiff = table_at(springs.tables[2 * j], springs.tables[2 * j + 1], springs.x, springs.y, e - slip)
-        damp = table_at(springs.tables[2 * j + 1], springs.tables[2 * j + 2], springs.x, springs.y, rate)
-        spring = share_of(turned, rise) * springs.preload[j] + stiff[0]
+        n = direction_of(j, springs, between, length[j])
+        e = wp.dot(n, between) - length[j]
+        stiff = table_at(springs.tables[2 * j], springs.tables[2 * j + 1], springs.x, springs.y, e)
+        damp = table_at(springs.tables[2 * j + 1], springs.tables[2 * j + 2], springs.x, springs.y, wp.dot(n, speed))
+        spring = preload[j] + stiff[0]
         T = spring + damp[0]
         if keeps:  # else the speed is that at t = 0
             T /= wp.float64(1.0) + wp.float64(0.5) * dt * springs.lightness[j] * damp[1]
@@ -219,30 +176,8 @@ def pull_springs(
             i = springs.node[k]
             nodal_force_out[i] = nodal_force_out[i] - springs.weight[k] * T * n
         if keeps and lane == 0:
-            keep_state(j, springs, e, slip, turned, stiff[2], state_out)
+            state_out.energy[j] = preload[j] * (e - springs.rest[j]) + stiff[2] - springs.lowest[j]
             state_out.tension[j] = T
-            state_out.pull[j] = T * n
-            state_out.along[j] = n
+            state_out.elongation[j] = e
             count_taken(j, (T - spring) * n, speed, dt, state_out)
         wait_for_block()  # the next spring may share nodes with this one
-
-
-@wp.kernel(enable_backward=False)
-def read_bolts(
-    begin: wp.array(dtype=wp.int32),
-    pull: wp.array(dtype=wp.vec3d),
-    along: wp.array(dtype=wp.vec3d),
-    axial_out: wp.array(dtype=wp.float64),
-    shear_out: wp.array(dtype=wp.float64),
-):
-    """Axial and shear force of bolts, whose springs begin at `begin`; their mean direction is that of the shank."""
-    b = wp.tid()
-    force = wp.vec3d()
-    axis = wp.vec3d()
-    for j in range(begin[b], begin[b + 1]):
-        force += pull[j]
-        axis += along[j]
-    axis = wp.normalize(axis)
-    axial = wp.dot(force, axis)
-    axial_out[b] = axial
-    shear_out[b] = wp.length(force - axial * axis)

@@ -127,9 +127,19 @@ def _section(outcomes: Sequence[Outcome]) -> list[str]:
 
 def _figure(path: Path, outcomes: Sequence[Outcome]) -> Path | None:
     """Error over element size, for every row that demands or shows an order; None when there is none."""
-    from warp_mca.results.figure_style import BLUE, GREEN, VERMILION, new_figure, save_png, tidy
+    from warp_mca.results import figure_style as style
+    from warp_mca.results.figure_style import new_figure, save_png, tidy
 
-    looks = {"hex8": (BLUE, "o", "-"), "hex8r": (VERMILION, "s", "--"), "tet4": (GREEN, "^", ":")}
+    looks = {
+        "hex8i": (style.BLACK, "D", "-"),
+        "hex8": (style.BLUE, "o", "-"),
+        "hex8r": (style.VERMILION, "s", "--"),
+        "hex8w": (style.ORANGE, "P", "-."),
+        "tet4": (style.GREEN, "^", ":"),
+        "tet10": (style.PURPLE, "v", "-."),
+        "tet10_mean": (style.SKY, "<", "-."),
+        "wedge6": (style.SKY, "h", "--"),
+    }
     curves = [(o, row) for o in outcomes for row in o.rows if row.order is not None and row.order > 0.3]
     if not curves:
         return None

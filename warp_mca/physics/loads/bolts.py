@@ -165,6 +165,7 @@ def _bar(assembly: Bodies, load: Bolt, own: Truss, ends: list[End], i: int, j: i
         length=length,
         preload=pull,
         rest=rest,
+        lowest=0.0,
         table=np.array([[0.0, 1.0], [0.0, k]]),
         damper=np.zeros((2, 0)),
         rise=RISE * (length + _reach(load)) / _speed(assembly, load),

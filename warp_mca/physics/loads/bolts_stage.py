@@ -1,19 +1,38 @@
-"""Owns the device side of bolts: their springs, and the forces in their shanks."""
+"""Owns the device side of bolts: their springs, what tightens them, and the forces in their shanks."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 import warp as wp
 
 from warp_mca.base.joining import offsets
-from warp_mca.kernels.nodes import spring
-from warp_mca.physics.loads.springs_stage import SpringsStage
+from warp_mca.kernels.nodes import bolt
+from warp_mca.physics.loads.springs_stage import BLOCK, SpringsStage, SpringsState
+from warp_mca.system.stage import Step
 
 if TYPE_CHECKING:
     from warp_mca.system.actor import System
     from warp_mca.system.state import State
+
+
+@dataclass(eq=False)
+class BoltsState(SpringsState):
+    """State of bolts: that of their springs, and of what tightens them.
+
+    Attributes:
+        length: L_0 of each spring [m], shape (count,), float64.
+        preload: of each [N], shape (count,), float64.
+        turned: time for which it has been tightened [s], shape (count,), float64.
+        work: of what tightens it up to t(n) [J], shape (count,), float64.
+    """
+
+    length: wp.array
+    preload: wp.array
+    turned: wp.array
+    work: wp.array
 
 
 class BoltsStage(SpringsStage):
@@ -24,19 +43,44 @@ class BoltsStage(SpringsStage):
         super().__init__(solver, name)
         self.begin = wp.array(offsets([len(item.bars) for item in self.items]), dtype=wp.int32)
         self.axial, self.shear = (wp.zeros(len(self.items), dtype=wp.float64) for _ in range(2))
+        self.shanks = bolt.Shanks()
+        self.shanks.preload, self.shanks.rise = self.preload, self.numbers("rise")
+        self.shanks.tightens = wp.zeros(1, dtype=wp.int32)
+
+    def tighten(self, on: bool) -> float:
+        """Bolts are tightened from now on, or no more; the longest rise of their preloads [s]."""
+        self.shanks.tightens.fill_(int(on))
+        return max(bar.rise for bar in self.bars)
+
+    def new_state(self) -> BoltsState:
+        """State before the first step, on the current device."""
+        springs = super().new_state()
+        own = {field.name: getattr(springs, field.name) for field in fields(springs)}
+        zeros = {key: wp.zeros(self.count, dtype=wp.float64) for key in ("preload", "turned", "work")}
+        return BoltsState(**own, **zeros, length=wp.clone(self.length))
 
     def record_kernels(self) -> list[Any]:
-        """Those of a step."""
-        return [*super().record_kernels(), spring.read_bolts]
+        """Those of a step, which have blocks of Warp's own size."""
+        return [*super().record_kernels(), bolt.tighten_bolts, bolt.read_bolts]
+
+    def push(self, step: Step, start: bool = False) -> None:
+        """Add the forces of all bolts, which may be tightened."""
+        state, kept = step.state.parts[self.name], bolt.ShankState()
+        for key in ("length", "preload", "turned", "work"):
+            setattr(kept, key, getattr(state, key))
+        inputs = [self.springs, self.shanks, self.work.X, step.state.u, 0.0 if start else self.dt]
+        wp.launch(bolt.tighten_bolts, (self.count, self.lanes), inputs=inputs, outputs=[kept], block_dim=BLOCK)
+        self.pull(step, start, state.length, state.preload)
 
     def energies_of(self, state: State) -> Sequence[wp.array]:
         """Stored, and given by what tightens them."""
         own = state.parts[self.name]
-        return [own.energy, own.taken]
+        return [own.energy, own.work]
 
     def readings_of(self, state: State) -> Sequence[wp.array]:
         """Axial and shear force."""
-        own = state.parts[self.name]
-        inputs, outputs = [self.begin, own.pull, own.along], [self.axial, self.shear]
-        wp.launch(spring.read_bolts, len(self.items), inputs=inputs, outputs=outputs)
+        inputs = [self.begin, self.springs, state.parts[self.name].tension, self.work.X, state.u]
+        outputs = [self.axial, self.shear]
+        threads = (len(self.items), self.lanes)
+        wp.launch(bolt.read_bolts, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK)
         return outputs

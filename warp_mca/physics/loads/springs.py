@@ -40,8 +40,9 @@ class SpringNodes(LoadedNodes):
         length: without tension [m].
         preload: tension at that length [N].
         rest: elongation without tension, at which no energy is stored [m]; 0 where there is none.
+        lowest: integral of the table from its first entry to it [J].
         table, damper: of tension over elongation [m], [N], and over its speed [m/s], [N], shape (2, count), float64.
-        rise: time in which the preload of a bolt's spring grows, which slips meanwhile [s]; 0 for others.
+        rise: time in which the preload of a bolt grows [s]; 0 for others.
     """
 
     middle: int = field(metadata=AS_IS)
@@ -54,6 +55,7 @@ class SpringNodes(LoadedNodes):
     length: float = field(metadata=AS_IS)
     preload: float = field(metadata=AS_IS)
     rest: float = field(metadata=AS_IS)
+    lowest: float = field(metadata=AS_IS)
     table: Array = field(metadata=AS_IS)
     damper: Array = field(metadata=AS_IS)
     rise: float = field(default=0.0, metadata=AS_IS)
@@ -98,6 +100,8 @@ def build(load: Spring, assembly: Bodies) -> SpringNodes:
     bodies = [load.body, *([] if load.other is None else [load.other])]
     own = [lightness(assembly, body, *end, n) for body, end in zip(bodies, ends, strict=True)]
     node, weight = (np.concatenate(parts) for parts in zip(*ends, strict=True))
+    table = np.array(load.table, dtype=np.float64)
+    rest = _rest(table, load.preload)
     added, decay = [], []
     for body, (nodes, share), light in zip(bodies, ends, own, strict=True):
         rigid = assembly.scene.body(body).rigid
@@ -116,8 +120,9 @@ def build(load: Spring, assembly: Bodies) -> SpringNodes:
         direction=direction,
         length=length if load.length is None else load.length,
         preload=load.preload,
-        rest=_rest(np.array(load.table), load.preload),
-        table=np.array(load.table, dtype=np.float64),
+        rest=rest,
+        lowest=_integral(table, rest),
+        table=table,
         damper=np.array(load.damper, dtype=np.float64),
     )
 
@@ -161,6 +166,16 @@ def _rest(table: Array, preload: float) -> float:
     low[0], high[-1] = -np.inf, np.inf  # they go on beyond the ends
     roots = (x[:-1] + way)[(way >= low) & (way <= high)]
     return float(roots[np.abs(roots).argmin()]) if len(roots) else 0.0
+
+
+def _integral(table: Array, end: float) -> float:
+    """Of a table from its first entry on [J], which goes on beyond its ends with the slope there; 0 without."""
+    if not table.size:
+        return 0.0
+    x, y = table
+    k = int(np.clip(np.searchsorted(x, end) - 1, 0, len(x) - 2))
+    slope, way = (y[k + 1] - y[k]) / (x[k + 1] - x[k]), end - x[k]
+    return float(np.trapezoid(y[: k + 1], x[: k + 1]) + way * (y[k] + 0.5 * slope * way))
 
 
 def _steepest(table: Array) -> float:

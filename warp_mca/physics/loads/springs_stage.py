@@ -28,15 +28,11 @@ class SpringsState:
 
     Attributes:
         energy: stored in each at t(n) [J], shape (count,), float64.
-        taken: by its dashpot, or given by what tightens a bolt, up to t(n) [J], shape (count,), float64.
+        taken: by its dashpot up to t(n) [J], shape (count,), float64.
         tension: T then [N], shape (count,), float64.
         elongation: L - L_0 then [m], shape (count,), float64.
         damper: tension of the dashpot along the spring then [N], shape (count,), vec3d.
         clock: 1 once a spring has taken a step [-], shape (count,), int32.
-        slip: elongation of a bolt's springs when it was tightened [m], shape (count,), float64.
-        pull: T n then [N], shape (count,), vec3d.
-        along: n then [-], shape (count,), vec3d.
-        turned: time for which it has been tightened [s], shape (count,), float64.
     """
 
     energy: wp.array
@@ -45,10 +41,6 @@ class SpringsState:
     elongation: wp.array
     damper: wp.array
     clock: wp.array
-    slip: wp.array
-    pull: wp.array
-    along: wp.array
-    turned: wp.array
 
 
 class SpringsStage(NodalLoad):
@@ -65,13 +57,13 @@ class SpringsStage(NodalLoad):
         own.weight = wp.array(np.concatenate([item.weight for item in items]), dtype=wp.float64)
         for key in ("ground", "direction"):
             setattr(own, key, wp.array([getattr(item, key) for item in items], dtype=wp.vec3d))
-        for key in ("length", "preload", "rest", "lightness", "rise"):
-            setattr(own, key, wp.array([getattr(item, key) for item in items], dtype=wp.float64))
+        for key in ("rest", "lowest", "lightness"):
+            setattr(own, key, self.numbers(key))
         tables = [table for item in items for table in (item.table, item.damper)]
         own.tables = wp.array(offsets([table.shape[1] for table in tables]), dtype=wp.int32)
         joined = np.concatenate(tables, axis=1)
         own.x, own.y = wp.array(joined[0], dtype=wp.float64), wp.array(joined[1], dtype=wp.float64)
-        own.tightens = wp.zeros(1, dtype=wp.int32)
+        self.length, self.preload = self.numbers("length"), self.numbers("preload")
         self.springs, self.scenes, self.dt = own, solver.layout.count, solver.common_dt
         self.lanes = BLOCK if wp.get_device().is_cuda else 1
 
@@ -79,17 +71,15 @@ class SpringsStage(NodalLoad):
         """One for each spring."""
         return len(item.bars)
 
-    def tighten(self, on: bool) -> float:
-        """Springs of bolts slip from now on, or no more; the longest rise of their preloads."""
-        self.springs.tightens.fill_(int(on))
-        return max(bar.rise for bar in self.bars)
+    def numbers(self, key: str) -> wp.array:
+        """A field of each spring, shape (count,), float64."""
+        return wp.array([getattr(bar, key) for bar in self.bars], dtype=wp.float64)
 
     def new_state(self) -> SpringsState:
         """State before the first step, on the current device."""
-        keys = ("energy", "taken", "tension", "elongation", "slip", "turned")
-        numbers = {key: wp.zeros(self.count, dtype=wp.float64) for key in keys}
-        vectors = {key: wp.zeros(self.count, dtype=wp.vec3d) for key in ("damper", "pull", "along")}
-        return SpringsState(**numbers, **vectors, clock=wp.zeros(self.count, dtype=wp.int32))
+        numbers = {key: wp.zeros(self.count, dtype=wp.float64) for key in ("energy", "taken", "tension", "elongation")}
+        damper, clock = wp.zeros(self.count, dtype=wp.vec3d), wp.zeros(self.count, dtype=wp.int32)
+        return SpringsState(**numbers, damper=damper, clock=clock)
 
     def record_kernels(self) -> list[Any]:
         """Those of a step, which have blocks of Warp's own size."""
@@ -97,10 +87,14 @@ class SpringsStage(NodalLoad):
 
     def push(self, step: Step, start: bool = False) -> None:
         """Add the forces of all springs."""
+        self.pull(step, start, self.length, self.preload)
+
+    def pull(self, step: Step, start: bool, length: wp.array, preload: wp.array) -> None:
+        """Add them with L_0 [m] and the preload [N] of each, shape (count,), float64."""
         state, work, kept = step.state, self.work, spring.SpringState()
         for field in fields(SpringsState):
             setattr(kept, field.name, getattr(state.parts[self.name], field.name))
-        inputs = [self.first, self.springs, work.X, state.u, state.v, self.dt, not start]
+        inputs = [self.first, self.springs, length, preload, work.X, state.u, state.v, self.dt, not start]
         threads, outputs = (self.scenes, self.lanes), [work.nodal_force, kept]
         wp.launch(spring.pull_springs, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK)
 
