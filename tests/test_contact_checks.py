@@ -3,6 +3,7 @@
 import pytest
 
 import warp_mca as mca
+from warp_mca.watch.energy import PEAK_LOSS
 
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
 
@@ -57,7 +58,9 @@ def test_a_master_too_coarse_to_dent_is_named():
     assert not said(ball(None, rigid=True), words)
 
 
-def test_corner_is_named_and_a_face_is_not():
+def test_corner_and_edge_are_named_and_a_face_is_not():
+    """An edge of three nodes; springs take force there, whatever a wave on the whole face would give."""
+
     def drop(turn: tuple[float, float, float], lift: float) -> mca.Result:
         box = mca.Box(size=(0.01, 0.01, 0.01), divisions=(2, 2, 2), origin=(-0.005, -0.005, -0.005))
         start = {"position": (0.0, lift, 0.0), "rotation": turn, "velocity": (0.0, -1.0, 0.0)}
@@ -68,6 +71,11 @@ def test_corner_is_named_and_a_face_is_not():
 
     assert not said(drop((0.0, 0.0, 0.0), 0.005), "a corner or an edge")
     assert said(drop((1.545738, 0.0, -1.545738), 0.008661), "a corner or an edge")  # it stands on one corner
+    edge = drop((0.0, 0.0, 0.785398), 0.0070712)
+    assert said(edge, "acted on 2.") and said(edge, "a corner or an edge")
+    assert said(edge, "until its peak no longer changes")
+    (share,), (loss,) = (edge.summary[f"contact_spring_{key}"].values() for key in ("share", "loss"))
+    assert loss == -PEAK_LOSS * share
 
 
 @pytest.mark.parametrize("bound", ["Prescribed", "Fixed", "free"])

@@ -131,7 +131,7 @@ class SceneRun:
             origin: times count from then on [s], after the first row of the impact.
         """
         ready, own = self.ready, self.rows(before[-1].facts["end"] if before else 0.0, origin)
-        shares = spring_shares(self._context, self.ledger, contact_names(ready.scene.contacts))
+        shares = spring_shares(self._context, self.ledger, contact_names(ready.scene.contacts), self._depths)
         summary = summarise(own.history, self._facts(wall, shares), own.contacts)
         summary |= self._rigid_facts(own.history, stopped is not None)
         told = self._told(stopped is not None, history=own.history, contacts=own.contacts, shares=shares, origin=origin)
@@ -146,6 +146,11 @@ class SceneRun:
     @property
     def _context(self) -> Context:
         return Context(scene=self.ready.scene, meshes=self.ready.meshes, model=self.ready.model)
+
+    @property
+    def _depths(self) -> list[Array]:
+        """Of each contact pass, largest penetration of each spring [m], shape (spring_count,), float64."""
+        return [stage.depths(self.state, self.index) for stage in self.solver.contacts]
 
     @property
     def step_count(self) -> int:
@@ -284,7 +289,7 @@ class SceneRun:
             steps_taken=self.state.steps,
             u=u[nodes],
             v=v[nodes],
-            depths=[stage.depths(self.state, self.index) for stage in self.solver.contacts],
+            depths=self._depths,
             bent=self.ledger.kept.stiffened if stopped else self.looks.bent(u),
             watch=self.looks.watch,
             stopped=stopped,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from warp_mca.system.model import Model
 
 PATCH = 6.0  # nodes that carry a Hertzian contact three cells across: 8 / 9 of pi / 4 times 3 squared
-POINT = 2.5  # nodes that carry a flat contact at least; fewer are a corner, or an edge of one cell
+PRESSED = 0.2  # of the greatest depth of a surface's nodes, from which on they bear what presses it
 FLUSH = 0.2  # distance of surfaces that lie on each other, over the width of a face, at most
 BOUND = 0.1  # component of a normal along an axis from which on a node that is bound there cannot follow the normal
 
@@ -29,7 +29,7 @@ BOUND = 0.1  # component of a normal along an axis from which on a node that is 
     "mesh;",
     "refine both bodies where they touch",
     PATCH,
-    f"nodes at least where surfaces are curved, three cells across; {POINT:g} where they are flat",
+    "nodes at least where surfaces are curved, three cells across; flat ones are to be pressed at all corners of a face",
 )
 def small_patch(c: Finished, patch: float) -> Iterator[Values]:
     """Nodes that carried each contact when its force was greatest."""
@@ -125,6 +125,25 @@ def frictionless_fit(c: Context, most: float) -> Iterator[Values]:
             yield dict(slave=contact.slave.body, master=contact.master.body)
 
 
+def on_edges(model: Model, k: int, depths: Sequence[Array]) -> bool:
+    """Whether edges or corners bear contact k: no face of its slaves is pressed at all its corners.
+
+    Args:
+        model: of the scene.
+        k: number of the contact.
+        depths: of each contact pass, largest penetration of each spring [m], shape (spring_count,).
+    """
+    found = False
+    for item, depth in zip(model.passes, depths, strict=True):
+        if item.contact == k and len(item.slave) and depth.any():
+            deep = depth.reshape(len(item.slave), -1).max(axis=1)
+            pressed = item.slave[deep > PRESSED * deep.max()]
+            if np.isin(item.slave_face, pressed).all(axis=1).any():
+                return False
+            found = True
+    return found
+
+
 def _few_nodes(c: Finished, k: int, patch: float) -> float:
     """Nodes that carried contact pass k at its greatest force, if these are few; else 0."""
     item = c.model.passes[k]
@@ -133,7 +152,8 @@ def _few_nodes(c: Finished, k: int, patch: float) -> float:
     planes = sum(share > 0.0 for share in _held(c.model, item))
     # A plane of symmetry leaves half of the patch, and half of the force on nodes in it.
     count = c.ledger.nodes_at_peak(k) * math.sqrt(2.0) ** planes
-    return count if count < (patch if is_curved_contact(c.model.X, item) else POINT) else 0.0
+    few = count < patch if is_curved_contact(c.model.X, item) else on_edges(c.model, item.contact, c.depths)
+    return count if few else 0.0
 
 
 def _pressed(model: Model, item: ContactPass, count: float, depth: Array) -> tuple[float, float]:

@@ -13,6 +13,7 @@ from warp_mca.kernels.records.columns import PRESSURE, SPRING_ENERGY
 from warp_mca.physics.contact.surfaces import is_curved_contact
 from warp_mca.physics.elements import ELEMENTS
 from warp_mca.scene import Contact, ContactAll, Settle, ThermalStrain
+from warp_mca.watch.contacts import on_edges
 from warp_mca.watch.ledger import MIN_EXCHANGE
 from warp_mca.watch.row import Context, Finished, SpringShare, Values, row, sides_of
 from warp_mca.watch.vibration import impedance, shadow
@@ -21,8 +22,8 @@ if TYPE_CHECKING:
     from warp_mca.system.model import Model
     from warp_mca.watch.ledger import Ledger
 
-# Relative loss of the force peak of a curved contact over the share of the exchanged energy that springs hold then;
-# measured on balls and links within a factor of 2, see docs/decisions.md.
+# Relative loss of the force peak of a curved contact, or of one on edges, over the share of the exchanged energy that
+# springs hold then; measured on balls, links and edges within a factor of 2, see docs/decisions.md.
 PEAK_LOSS = 0.3
 # Force of a flat contact over that of one wave up to which it may be that wave: with default springs, and with others,
 # which may ring at 3.4 times that force.
@@ -62,7 +63,7 @@ def turned_edge(c: Finished, _: float) -> Iterator[Values]:
 @row(
     "contact springs held {share:.0%} of the energy that bodies had exchanged when the force of {name} was greatest: "
     "its peak is some {loss:.0%} below that of stiff springs, and later;",
-    "{remedy}, or refine the mesh there",
+    "{remedy}",
     0.03,
     "of the force peak at most",
 )
@@ -71,11 +72,13 @@ def soft_springs(c: Finished, most: float) -> Iterator[Values]:
     curved = _curved(c.model)
     for k, ((name, springs), contact) in enumerate(zip(c.shares.items(), c.scene.contacts, strict=True)):
         if springs is not None and springs.loss > most and not springs.rest and not _given(contact):
-            remedy = "raise the contact's penalty"
-            if contact.penalty is None and k not in curved:
-                remedy = "give the contact penalty=10"
+            remedy = "raise the contact's penalty, or refine the mesh there"
+            if springs.edges:
+                remedy = "give the contact penalty=10 and refine the mesh there until its peak no longer changes"
+            elif contact.penalty is None and k not in curved:
+                remedy = "give the contact penalty=10, or refine the mesh there"
             elif contact.penalty is not None and k in curved:
-                remedy += " or leave it to its default"
+                remedy = "raise the contact's penalty or leave it to its default, or refine the mesh there"
             yield dict(share=springs.share, name=name, loss=springs.loss, remedy=remedy)
 
 
@@ -112,7 +115,9 @@ def lagging_vectors(c: Finished, most: float) -> Iterator[Values]:
         yield dict(hourglass=spent, share=spent / plastic)
 
 
-def spring_shares(c: Context, ledger: Ledger, names: Sequence[str]) -> dict[str, SpringShare | None]:
+def spring_shares(
+    c: Context, ledger: Ledger, names: Sequence[str], depths: Sequence[Array]
+) -> dict[str, SpringShare | None]:
     """Energy in the springs of each contact as a share s of what the bodies have exchanged, when its force is greatest.
 
     What is exchanged is kinetic energy gained or lost since the start, or energy that is not kinetic, whichever is
@@ -123,6 +128,7 @@ def spring_shares(c: Context, ledger: Ledger, names: Sequence[str]) -> dict[str,
         c: scene, meshes and model.
         ledger: of the run; rows of its history count.
         names: of the scene's contacts.
+        depths: of each contact pass, largest penetration of each spring [m], shape (spring_count,), float64.
     """
     springs, energy = ledger.springs(ledger.table()), ledger.energies()
     work, kinetic = energy.pop("external_work"), energy["kinetic"]
@@ -138,9 +144,9 @@ def spring_shares(c: Context, ledger: Ledger, names: Sequence[str]) -> dict[str,
             continue
         row = _row_at_rest(c, k, force, greatest)
         if row is None:
-            share = float(held[greatest] / exchanged[greatest])
-            loss = _loss(c, k, share, float(force[greatest]), ledger.time())
-            found[name] = SpringShare(share=share, loss=loss)
+            share, edges = float(held[greatest] / exchanged[greatest]), on_edges(c.model, k, depths)
+            loss = PEAK_LOSS * share if edges else _loss(c, k, share, float(force[greatest]), ledger.time())
+            found[name] = SpringShare(share=share, loss=loss, edges=edges)
         else:
             loss = float(energy["contact"][row] / series[row])
             found[name] = SpringShare(share=float(held[row] / series[row]), loss=loss, rest=True)
