@@ -125,7 +125,9 @@ class Watch:
 
 
 looked = partial(
-    row, unit="as deep at most as springs, flat faces and an overlap at the start explain", when=When.LOOKS
+    row,
+    unit="as deep at most as springs, a twentieth of the thinner body and an overlap at the start explain",
+    when=When.LOOKS,
 )
 
 
