@@ -19,7 +19,7 @@ from warp_mca.geometry.mesh import Mesh
 from warp_mca.scene import Scene
 from warp_mca.system.contact import ContactPass
 from warp_mca.system.model import Model
-from warp_mca.watch.passing_cases import SLACK, BelowPlane, Case, Look, WithinBody, WithinItself, cases_of
+from warp_mca.watch.passing_cases import DEEP, SLACK, BelowPlane, Case, Look, WithinBody, WithinItself, cases_of
 from warp_mca.watch.row import Array, Finished, Values, When, row
 from warp_mca.watch.skins import Skin
 
@@ -99,7 +99,9 @@ class Watch:
         look = Look(self._skins)
         passed = passed.copy() if len(passed) else self._start(look)
         for case, kept in zip(self.cases, passed, strict=True):
-            allowed = case.slack + PRESSED * max((pressed[k] for k in case.passes), default=0.0)
+            allowed = case.slack
+            if case.passes:
+                allowed = max(allowed + PRESSED * max(pressed[k] for k in case.passes), DEEP * case.thickness)
             depth, at = case.found(look, allowed)
             if depth > allowed + MEANT * kept[START]:
                 kept[TIME] = kept[TIME] if kept[DEPTH] else time
@@ -126,7 +128,7 @@ class Watch:
 
 looked = partial(
     row,
-    unit="as deep at most as springs, a twentieth of the thinner body and an overlap at the start explain",
+    unit=f"as deep at most as springs, flat faces and an overlap at the start explain, or {DEEP:g} of the thinner body",
     when=When.LOOKS,
 )
 

@@ -20,7 +20,8 @@ from warp_mca.watch.skins import NOWHERE, Found, Skin, crossed
 
 Mask = NDArray[np.bool_]
 
-SLACK = 0.05  # of the thinner body, by which skins may cross; without contact of the wider faces, too: these are flat
+SLACK = 0.05  # of the wider faces, and of the thinner body, by which skins may cross: their faces are flat
+DEEP = 0.1  # of the thinner body, by which skins may cross that contact keeps apart, as by its springs alone
 SHARE = 0.5  # of the thinnest part of two bodies that they move on between two looks at most
 BEND = 0.25  # of the gap between parts of a body that its nodes move out of shape before it is looked at
 SLENDER = 8.0  # lengths over thickness from which on a body without gaps may meet itself
@@ -86,8 +87,12 @@ class Case:
     @property
     def slack(self) -> float:
         """How deep they may lie in each other [m]."""
-        wide = np.inf if self.passes else max(skin.width for skin in self.skins)
-        return SLACK * min(wide, *(skin.thickness for skin in self.skins))
+        return SLACK * min(max(skin.width for skin in self.skins), self.thickness)
+
+    @property
+    def thickness(self) -> float:
+        """Of the thinner one [m]."""
+        return min(skin.thickness for skin in self.skins)
 
     @property
     def key(self) -> tuple[str, ...]:
