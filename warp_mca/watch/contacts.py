@@ -29,7 +29,7 @@ BOUND = 0.1  # component of a normal along an axis from which on a node that is 
     "mesh;",
     "refine both bodies where they touch",
     PATCH,
-    "nodes at least where surfaces are curved, three cells across; flat ones are to be pressed at all corners of a face",
+    "nodes at least where surfaces are curved, three cells across; a face pressed at all corners where they are flat",
 )
 def small_patch(c: Finished, patch: float) -> Iterator[Values]:
     """Nodes that carried each contact when its force was greatest."""
