@@ -23,7 +23,6 @@ from warp_mca.watch.passing_cases import DEEP, SLACK, BelowPlane, Case, Look, Wi
 from warp_mca.watch.row import Array, Finished, Values, When, row
 from warp_mca.watch.skins import Skin
 
-PRESSED = 2.0  # times the depth of a contact's springs, up to which skins cross by the contact's own doing
 MEANT = 1.25  # times the overlap at the start, up to which it is meant
 FEWEST = 6  # looks in an impact phase at least
 CLOSEST = 4  # steps between two looks at least: in so few nothing passes two cells below half of the wave speed
@@ -99,9 +98,7 @@ class Watch:
         look = Look(self._skins)
         passed = passed.copy() if len(passed) else self._start(look)
         for case, kept in zip(self.cases, passed, strict=True):
-            allowed = case.slack
-            if case.passes:
-                allowed = max(allowed + PRESSED * max(pressed[k] for k in case.passes), DEEP * case.thickness)
+            allowed = case.allowed(pressed)
             depth, at = case.found(look, allowed)
             if depth > allowed + MEANT * kept[START]:
                 kept[TIME] = kept[TIME] if kept[DEPTH] else time

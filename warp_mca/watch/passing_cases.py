@@ -21,6 +21,7 @@ from warp_mca.watch.skins import NOWHERE, Found, Skin, crossed
 Mask = NDArray[np.bool_]
 
 SLACK = 0.05  # of the wider faces, and of the thinner body, by which skins may cross: their faces are flat
+PRESSED = 2.0  # times the depth of a contact's springs, up to which skins cross by the contact's own doing
 DEEP = 0.1  # of the thinner body, by which skins may cross that contact keeps apart, as by its springs alone
 SHARE = 0.5  # of the thinnest part of two bodies that they move on between two looks at most
 BEND = 0.25  # of the gap between parts of a body that its nodes move out of shape before it is looked at
@@ -94,6 +95,11 @@ class Case:
         """Of the thinner one [m]."""
         return min(skin.thickness for skin in self.skins)
 
+    def allowed(self, pressed: Array) -> float:
+        """How deep they may lie in each other where springs of passes were so deep, shape (pass_count,) [m]."""
+        own = [float(pressed[k]) for k in self.passes]
+        return max(self.slack + PRESSED * max(own), DEEP * self.thickness) if own else self.slack
+
     @property
     def key(self) -> tuple[str, ...]:
         """What tells it from others of a scene."""
@@ -120,6 +126,10 @@ class BelowPlane(Case):
     kept_out: Mask
     plane: RigidPlane
     remedies = BELOW, BELOW
+
+    def allowed(self, pressed: Array) -> float:
+        """How deep nodes that no spring holds may lie below the plane [m]: as springs of others, and flat faces."""
+        return self.slack + PRESSED * max((float(pressed[k]) for k in self.passes), default=0.0)
 
     def found(self, look: Look, least: float) -> Found:
         """The deepest node below the plane, if it is deeper than `least` [m]."""
