@@ -12,6 +12,7 @@ from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
 from warp_mca.base.rotation import mean_spin, point_velocity, rotation_matrix
 from warp_mca.kernels.nodes import joint_arrays as columns
+from warp_mca.physics.rigid.couplers import coupler_rows
 from warp_mca.scene.amplitude import CONSTANT, Amplitude
 from warp_mca.scene.freedoms import Controller, Freedom, PositionServo, Whole
 from warp_mca.scene.joints import Joint
@@ -56,6 +57,7 @@ def join_whole(
     joints: list[BodyJoint] = []
     rows: list[RigidRow] = []
     pins: list[RigidPin] = []
+    found_rates: list[Array] = []
     place = {body.name: k for k, body in enumerate(bodies)}
     for joint, own in zip(parts.scene.joints, found, strict=True):
         whole = joint.whole()
@@ -64,7 +66,7 @@ def join_whole(
         a, b = place.get(joint.body, GROUND), place.get(joint.other or "", GROUND)
         nodes = pairs["joint_first"][own.start : own.end]
         item = _body_joint(parts, joint, whole, bodies, a, b, first_pin + len(pins) if len(nodes) else -1)
-        _check_motion(joint, item, bodies, parts, velocity, nodes)
+        found_rates.append(_start_rates(joint, item, bodies, parts, velocity, nodes))
         if len(nodes):
             pins.append(_pin(parts, joint, item, own, max(a, b), nodes))
         first, second = (b, GROUND) if item.soft else (a, b)
@@ -82,7 +84,7 @@ def join_whole(
             for k in range(6)
         ]
         joints.append(item)
-    return Joined(tuple(joints), tuple(rows), tuple(pins))
+    return Joined(tuple(joints), (*rows, *coupler_rows(parts.scene, joints, found_rates)), tuple(pins))
 
 
 def _frame(parts: Bodies, body: str | None) -> tuple[Array, Array]:
@@ -199,13 +201,13 @@ def _pin(parts: Bodies, joint: Joint, item: BodyJoint, own: JointPairs, body: in
     )
 
 
-def _check_motion(
+def _start_rates(
     joint: Joint, item: BodyJoint, bodies: Sequence[RigidBody], parts: Bodies, velocity: Array, nodes: Index
-) -> None:
-    """Refuse bodies whose velocities at the start a joint does not allow.
+) -> Array:
+    """Rates of a joint at the start [rad/s], [m/s], shape (rate_count,), float64.
 
     Raises:
-        RequestError: it does not.
+        RequestError: the bodies have velocities that it does not allow.
     """
     motions, speed = [], 0.0
     for k in (item.body, item.other):
@@ -219,8 +221,10 @@ def _check_motion(
     relative = motions[0] - motions[1]
     twist = np.concatenate([item.length * relative[0], relative[1]])
     screws = item.screws()
-    left = twist - screws.T @ np.linalg.lstsq(screws.T, twist, rcond=None)[0] if len(screws) else twist
+    rates = np.linalg.lstsq(screws.T, twist, rcond=None)[0] if len(screws) else np.zeros(0)
+    left = twist - screws.T @ rates
     if np.linalg.norm(left) > ASTRAY * speed:
         what = f"part of their relative velocity at the start, {np.linalg.norm(left):.3g} m/s, it does not allow"
         bound = f"{joint.body} and {joint.other or 'the ground'}"
         raise bad_value(f"{joint.title}.body", joint.body, f"it joins {bound}, and {what}; give both one that fits")
+    return np.asarray(rates, dtype=np.float64)
