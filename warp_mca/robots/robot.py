@@ -140,9 +140,9 @@ class Robot:
         are Articulations with springs, dampers, friction, armature, limits and drives, which go on acting at the
         controls that are held. Joints that equalities gear follow by a `Coupler`; a tendon pulls such joints with its
         actuators and spring, others with the force it has at the touch. Of the file's geoms those are meshed that may
-        touch within the impact; a round one has a node where it touches first. Geoms of the world are held. What the file's link has beyond
-        the mass of its mesh rides on it as a rigid body, "NAME rest", to which it is mounted; where they differ by no
-        more than 2 %, the link swings with the mass of its mesh.
+        touch within the impact; a round one has a node where it touches first. Geoms of the world are held. What the
+        file's link has beyond the mass of its mesh rides on it as a rigid body, "NAME rest", to which it is mounted;
+        where they differ by no more than 2 %, the link swings with the mass of its mesh.
 
         Args:
             impact: the phase.
