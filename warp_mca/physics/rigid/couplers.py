@@ -12,16 +12,16 @@ from warp_mca.scene import Scene
 from warp_mca.system.body_joints import BodyJoint
 from warp_mca.system.rigid import RigidRow
 
-ASTRAY = 1e-6  # of the rates at the start, by which they may be against a coupler
+ASTRAY = 1e-6  # of the bodies' speeds at the start, by which rates may be against a coupler
 
 
-def coupler_rows(scene: Scene, joints: Sequence[BodyJoint], rates: Sequence[Array]) -> list[RigidRow]:
+def coupler_rows(scene: Scene, joints: Sequence[BodyJoint], rates: Sequence[tuple[Array, Array]]) -> list[RigidRow]:
     """A row for each coupler.
 
     Args:
         scene: with couplers.
         joints: between whole bodies.
-        rates: of each at the start [rad/s], [m/s].
+        rates: of each at the start, and those that count as its bodies' speed [rad/s], [m/s].
 
     Raises:
         RequestError: rates at the start are against a coupler.
@@ -35,8 +35,9 @@ def coupler_rows(scene: Scene, joints: Sequence[BodyJoint], rates: Sequence[Arra
             j, leader = place[name], place[coupler.joint]
             k = sum(item.rates for item in own[:number])
             m = sum(item.rates for item in freedoms[coupler.joint][: coupler.freedom - 1])
-            rate, other = float(rates[j][k]) + 0.0, float(rates[leader][m]) + 0.0
-            if abs(rate - coupler.ratio * other) > ASTRAY * max(abs(rate), abs(coupler.ratio * other)):
+            rate, other = float(rates[j][0][k]) + 0.0, float(rates[leader][0][m]) + 0.0
+            fast = max(float(rates[j][1][k]), abs(coupler.ratio) * float(rates[leader][1][m]))
+            if abs(rate - coupler.ratio * other) > ASTRAY * fast:
                 remedy = (
                     f"freedom {number + 1} of joint {name} starts at {rate:.6g} and the other one at {other:.6g} per s"
                 )
