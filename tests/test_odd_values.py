@@ -64,6 +64,7 @@ SOUND: dict[type, Any] = {
     mca.Prismatic: mca.Prismatic(name="P", body="up", nodes="ymax", axis=(1.0, 0.0, 0.0)),
     geometry.InertiaBrick: geometry.InertiaBrick(mass=1.0, centre=(0.0, 0.0, 0.0), inertia=(1.0, 1.0, 1.0)),
     mca.Freedom: mca.Freedom(at=(0.0, 0.0, 0.0), stiffness=1.0, limits=(0.0, 1.0)),
+    mca.Coupler: mca.Coupler(joint="A", freedom=1, ratio=2.0),
     mca.PositionServo: mca.PositionServo(kp=1.0, kv=0.1, target=0.5, limits=(-1.0, 1.0)),
     mca.Controller: mca.Controller(function=lambda t, q, rate: -q, period=1e-7),
     mca.Articulation: mca.Articulation(name="A", body="low", freedoms=(mca.Freedom(),)),
@@ -221,6 +222,9 @@ def scene_with(item: Any) -> mca.Scene:
             change = {"loads": (item,)}
         case mca.Freedom():
             return scene_with(mca.Articulation(name="A", body="low", freedoms=(item,)))
+        case mca.Coupler():
+            freedoms = (mca.Freedom(), mca.Freedom(axis=(1.0, 0.0, 0.0), follows=item))
+            return scene_with(mca.Articulation(name="A", body="low", freedoms=freedoms))
         case mca.PositionServo() | mca.Controller():
             return scene_with(mca.Freedom(motor=item))
         case Joint() if item.whole() is not None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
 import warp_mca as mca
 from warp_mca.geometry.quality import check
 from warp_mca.robots.geoms import filled
+from warp_mca.robots.skins import Skin
 from warp_mca.verify.machines import robot, write_stl
 
 pytest.importorskip("mujoco")
@@ -45,6 +48,33 @@ def test_a_concave_surface_has_its_own_faces():
         filled("channel", (points, faces[1:]), "skin")
     with pytest.raises(mca.RequestError, match="faces inwards"):
         filled("channel", (points, faces[:, ::-1]), "skin")
+
+
+def test_distance_of_points_around_and_in_a_channel():
+    """The deepest point counts, even where another one lies just above the surface."""
+    skin = Skin(*channel())
+    for points, exact, which in (
+        ([[0.0, 0.0, 0.03], [0.0, 0.0, 0.005]], 0.005, 1),  # above the groove, and in it
+        ([[0.0, 0.0, 0.001], [0.0, 0.0, -0.008], [0.02, 0.0, 0.01]], -0.01, 2),
+        ([[0.0, 0.0, 1e-5], [0.0, 0.0, -0.009]], -0.009, 1),
+        ([[0.04, 0.0, 0.03], [9.0, 0.0, 0.0]], math.hypot(0.01, 0.01), 0),
+        ([[0.0, 0.025, 5.0], [0.02, 0.025, 0.02]], 0.01, 1),
+    ):
+        found = skin.nearest(np.array(points))
+        assert found[:2] == (pytest.approx(exact, rel=1e-12), which)
+        assert np.linalg.norm(found[2] - points[which]) == pytest.approx(abs(exact), rel=1e-12)
+
+
+def test_a_pair_that_was_far_is_met_after_another_one_was_near(tmp_path):
+    """A ball on a spring, x = 0.1 sin 10 t, turns 1 mm before one wall and meets the other one on its way back."""
+    walls = (("right", 0.1 + 0.001 + 0.01 + 0.02), ("left", -0.05 - 0.01 - 0.02))
+    boxes = "".join(f'<geom name="{n}" type="box" size="0.02 0.1 0.1" pos="{x} 0 0"/>' for n, x in walls)
+    text = f"""<mujoco><option gravity="0 0 0"/><worldbody>{boxes}<body name="ball">
+      <joint name="x" type="slide" axis="1 0 0" stiffness="100"/><geom name="head" size="0.01" mass="1"/></body>
+      </worldbody></mujoco>"""
+    swing = robot(text, tmp_path, qvel={"x": 1.0}).swing()
+    assert swing.touch is not None and "left" in (swing.touch.first, swing.touch.second)
+    assert swing.t_end == pytest.approx(0.1 * (math.pi + math.asin(0.5)), abs=1e-9)
 
 
 def test_a_box_falls_into_the_groove_of_a_mesh(tmp_path):

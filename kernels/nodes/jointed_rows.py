@@ -7,6 +7,7 @@ import warp as wp
 
 from warp_mca.kernels.hardware.block import wait_for_block
 from warp_mca.kernels.nodes.cluster import Clusters
+from warp_mca.kernels.nodes.couplers import coupler_lightness, give_couplers, is_coupler, open_couplers
 from warp_mca.kernels.nodes.joint_drives import count_loads, count_rates, push_joint
 from warp_mca.kernels.nodes.rigid_joints import close_joint, place_joint
 from warp_mca.kernels.nodes.rigid_motion import Poses, RigidBodies, RigidStep, find_motion
@@ -101,6 +102,8 @@ def jointed_lightness(r: int, s: int, bodies: RigidBodies, rows: RigidRows, move
     if f >= 0:
         if step.joints.ahead[f] <= wp.float64(0.0):
             return wp.float64(0.0)
+    if is_coupler(r, rows) or is_coupler(s, rows):
+        return coupler_lightness(r, s, bodies, rows, moves, step)
     found = row_lightness(r, s, bodies, rows, moves, step)
     if e >= 0 and r == s:
         found += wp.float64(1.0) / step.joints.ahead[e]
@@ -133,7 +136,9 @@ def satisfy_joints(
             close_joint(rows.joints.member[m], span, counts, rows.joints, poses_out, step_out)
         wait_for_block()
         if lane == 0:
-            step_out.joints.worst[k] = opening(begin, end, span, counts, rows, clusters, poses_out, step_out)
+            worst_row = opening(begin, end, span, counts, rows, clusters, poses_out, step_out)
+            worst_row = open_couplers(begin, end, span, worst_row, rows, poses_out.joints, step_out)
+            step_out.joints.worst[k] = worst_row
         wait_for_block()
         worst = step_out.joints.worst[k]
         if wp.abs(span) * worst <= rows.joints.rounding or (step > 0 and worst >= best):
@@ -142,6 +147,7 @@ def satisfy_joints(
         if lane == 0:
             solve_factorised(rows.entry[k], end - begin, begin, step_out.matrix, step_out.value)
             give_impulses(begin, end, counts, rows, poses_out, impulse_out, step_out)
+            give_couplers(begin, end, rows, poses_out, impulse_out, step_out)
         move_bodies(k, lane, span, bodies, rows, poses_out, step_out)
     for m in range(rows.joints.begin[k] + lane, rows.joints.begin[k + 1], wp.block_dim()):
         j = rows.joints.member[m]

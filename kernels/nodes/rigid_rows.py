@@ -40,6 +40,9 @@ class RigidRows:
         sign: of this impulse, 1 where the first body is the joint's first one, else -1, shape (row_count,), float64.
         joint: between whole bodies that the row belongs to, -1 of others, shape (row_count,), int32.
         rate: of its freedoms that the row holds back, -1 of others, shape (row_count,), int32.
+        part: rows of the two rates that a row ties as a coupler, -1 of other rows, shape (row_count,), vec2i.
+        ratio: of the coupler, shape (row_count,), float64.
+        offset: position of its one rate less ratio times that of the other [rad], [m], shape (row_count,), float64.
         joints: these.
     """
 
@@ -60,6 +63,9 @@ class RigidRows:
     sign: wp.array(dtype=wp.float64)
     joint: wp.array(dtype=wp.int32)
     rate: wp.array(dtype=wp.int32)
+    part: wp.array(dtype=wp.vec2i)
+    ratio: wp.array(dtype=wp.float64)
+    offset: wp.array(dtype=wp.float64)
     joints: RigidJoints
 
 
@@ -161,6 +167,33 @@ def opening(
 
 
 @wp.func
+def give_impulse(
+    r: int,
+    size: wp.float64,
+    counts: bool,
+    rows: RigidRows,
+    poses_out: Poses,
+    impulse_out: wp.array(dtype=wp.vec3d),
+    step_out: RigidStep,
+):
+    """Apply an impulse of row r to its bodies and to the cluster of its pin."""
+    a = rows.first[r]
+    b = rows.second[r]
+    J = size * step_out.normal[r]
+    poses_out.momentum[a] = poses_out.momentum[a] + J
+    poses_out.spin[a] = poses_out.spin[a] + size * wp.quat_rotate(poses_out.rotation[a], step_out.lever[r, 0])
+    if b >= 0:
+        poses_out.momentum[b] = poses_out.momentum[b] - J
+        poses_out.spin[b] = poses_out.spin[b] - size * wp.quat_rotate(poses_out.rotation[b], step_out.lever[r, 1])
+    if counts and rows.pair[r] >= 0:
+        impulse_out[rows.pair[r]] = impulse_out[rows.pair[r]] + rows.sign[r] * J
+    p = rows.pin[r]
+    if p >= 0:
+        step_out.impulse[p, 0] = step_out.impulse[p, 0] - J
+        step_out.impulse[p, 1] = step_out.impulse[p, 1] - size * step_out.twist[r]
+
+
+@wp.func
 def give_impulses(
     begin: int,
     end: int,
@@ -172,23 +205,10 @@ def give_impulses(
 ):
     """Apply the impulses of rows to their bodies and to clusters of pins, equal and opposite at the common point."""
     for r in range(begin, end):
-        a = rows.first[r]
-        b = rows.second[r]
         size = step_out.value[r]
-        J = size * step_out.normal[r]
         if rows.joint[r] >= 0:
             step_out.joints.total[r] = step_out.joints.total[r] + size
-        poses_out.momentum[a] = poses_out.momentum[a] + J
-        poses_out.spin[a] = poses_out.spin[a] + size * wp.quat_rotate(poses_out.rotation[a], step_out.lever[r, 0])
-        if b >= 0:
-            poses_out.momentum[b] = poses_out.momentum[b] - J
-            poses_out.spin[b] = poses_out.spin[b] - size * wp.quat_rotate(poses_out.rotation[b], step_out.lever[r, 1])
-        if counts and rows.pair[r] >= 0:
-            impulse_out[rows.pair[r]] = impulse_out[rows.pair[r]] + rows.sign[r] * J
-        p = rows.pin[r]
-        if p >= 0:
-            step_out.impulse[p, 0] = step_out.impulse[p, 0] - J
-            step_out.impulse[p, 1] = step_out.impulse[p, 1] - size * step_out.twist[r]
+        give_impulse(r, size, counts, rows, poses_out, impulse_out, step_out)
 
 
 @wp.func

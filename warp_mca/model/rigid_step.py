@@ -67,7 +67,7 @@ def stable_with_rigid(parts: Assembly, rigid: Rigid, added: Array, velocity: Arr
         worst = (2.0 * USUAL_SCALE) ** 2 / BOUNCE * _largest(body, parts.X, added[body.own] * parts.mass[body.own])
         if worst * found.dt**2 > 4.0:
             found = StableStep(dt=2.0 / math.sqrt(worst), element=element, contact_share=1.0, shortened=1.0)
-        points = [row.point for row in rigid.rigid_rows if place in (row.first, row.second)]
+        points = [row.point for row in rigid.rigid_rows if place in (row.first, row.second) and row.geared < 0]
         rate = likely_rate(body, parts.scene, _rate(body, parts, velocity), points)
         if rate * found.dt > TURN:
             found = replace(found, dt=TURN / rate, element=element, contact_share=0.0)

@@ -20,6 +20,7 @@ class Watch:
 
     Attributes:
         start: gap at the start [m].
+        latest: gap at the latest time [m].
         touching: whether the gap is closed at the start and shrinks.
         closest: smallest gap so far [m] and when it was [s], out of the ends of steps and the minima between them.
     """
@@ -36,16 +37,21 @@ class Watch:
         """
         self._gap, self._count = gap, count
         self._t, self._rate = t, self._approach(t, y)
-        self.start = self._distance(t, y)
+        self.start = self.latest = self._distance(t, y)
         self.closest = (self.start, t)
         self._closed = self.start <= round_off
         ahead = gap(t + PROBE, y[:count] + PROBE * y[count : 2 * count])  # of kinks in the gap, the side to come
         self.touching = self._closed and ahead < self.start
 
+    def restart(self, t: float, y: Array) -> None:
+        """Go on from time t [s] and state y, after steps in which the gap stayed open and had no new minimum."""
+        self._t, self._rate = t, self._approach(t, y)
+
     def advance(self, path: Callable[[float], Array], t: float, y: Array) -> float | None:
         """Follow the gap to time t [s] and state y along `path`; the time at which it closes on the way, or None."""
         before, rate_before = self._t, self._rate
         value, self._t, self._rate = self._distance(t, y), t, self._approach(t, y)
+        self.latest = value
         self._note(value, t)
         if self._closed:
             return self._leave(path, before, rate_before, value)

@@ -12,6 +12,7 @@ from warp_mca.robots.machine import FRICTION_RATE
 from warp_mca.scene import Amplitude, Freedom, PositionServo
 
 if TYPE_CHECKING:
+    from warp_mca.robots.gearing import Gearing
     from warp_mca.robots.machine import Machine
 
 SOFT = 1e-9  # stiffness of the servo that stands for a constant torque with clamps, over that torque [1/rad, 1/m]
@@ -69,7 +70,7 @@ def compensated(machine: Machine) -> float:
 
 
 class Drive(NamedTuple):
-    """Torque of an actuator on its joint: clamp(constant - kp q - kv q').
+    """Torque of an actuator on a joint: clamp(constant - kp q - kv q').
 
     Attributes:
         constant: [N m], [N].
@@ -83,8 +84,8 @@ class Drive(NamedTuple):
     limits: tuple[float, float] | None
 
 
-def freedom_of(machine: Machine, joint: int, qpos: Array) -> Freedom:
-    """The freedom of a joint of the file, at coordinates `qpos`.
+def freedom_of(machine: Machine, joint: int, qpos: Array, gearing: Gearing) -> Freedom:
+    """The freedom of a joint of the file, at coordinates `qpos`, with what tendons and equalities do to it.
 
     Positions count from the pose in which axes are given, so that `ref` of the file is taken off.
 
@@ -97,7 +98,10 @@ def freedom_of(machine: Machine, joint: int, qpos: Array) -> Freedom:
     if kind == int(mj.mjtJoint.mjJNT_BALL):
         return Freedom(kind="ball", at=at, damping=float(model.dof_damping[dof]))  # type: ignore[arg-type]
     zero = float(model.qpos0[place])
-    motor, damping = _motor(machine, joint, zero)
+    motor, damping = _motor(machine, joint, zero, gearing)
+    stiffness, rest, slowed = gearing.spring(
+        joint, float(model.jnt_stiffness[joint]), float(model.qpos_spring[place]) - zero
+    )
     found: dict[str, Any] = {}
     if dof in (listed := machine.limited.tolist()):
         k = listed.index(dof)
@@ -109,25 +113,30 @@ def freedom_of(machine: Machine, joint: int, qpos: Array) -> Freedom:
         axis=tuple(float(v) for v in model.jnt_axis[joint]),  # type: ignore[arg-type]
         at=at,  # type: ignore[arg-type]
         position=float(qpos[place]) - zero,
-        stiffness=float(model.jnt_stiffness[joint]),
-        rest=float(model.qpos_spring[place]) - zero,
-        damping=float(model.dof_damping[dof]) + damping,
+        stiffness=stiffness,
+        rest=rest,
+        damping=float(model.dof_damping[dof]) + damping + slowed,
         friction=float(model.dof_frictionloss[dof]),
         friction_rate=FRICTION_RATE,
         armature=float(model.dof_armature[dof]),
         motor=motor,
+        follows=gearing.coupler(joint),
         **found,
     )
 
 
-def _motor(machine: Machine, joint: int, zero: float) -> tuple[Amplitude | PositionServo | None, float]:
+def _motor(
+    machine: Machine, joint: int, zero: float, gearing: Gearing
+) -> tuple[Amplitude | PositionServo | None, float]:
     """What drives a joint during an impact at held controls, and the damping that goes with it.
 
     Raises:
         RequestError: several actuators with clamps drive it, or one drives it away from rest.
     """
     model, name = machine.model, machine.names.joint(joint)
-    drives = [_drive(machine, k, zero) for k in range(model.nu) if int(model.actuator_trnid[k, 0]) == joint]
+    tendon, own = int(machine.mj.mjtTrn.mjTRN_TENDON), model.actuator_trnid[:, 0] == joint
+    drives = [drive_of(machine, int(k), 1.0, zero) for k in np.flatnonzero(own & (model.actuator_trntype != tendon))]
+    drives += gearing.drives(joint)
     if machine.passive or not drives:
         return None, 0.0
     if len(drives) > 1 and any(drive.limits for drive in drives):
@@ -155,8 +164,11 @@ def _motor(machine: Machine, joint: int, zero: float) -> tuple[Amplitude | Posit
     return PositionServo(kp=kp, kv=kv, target=constant / kp, limits=limits), 0.0
 
 
-def _drive(machine: Machine, k: int, zero: float) -> Drive:
-    """The torque of actuator k on its joint: gear (gain ctrl + bias), each affine in gear q and gear q'."""
+def drive_of(machine: Machine, k: int, pull: float, zero: float) -> Drive:
+    """The torque of actuator k on a joint: pull gear (gain ctrl + bias), each affine in gear l and gear l'.
+
+    Of an actuator of the joint itself l is its coordinate; of one of a tendon, l = pull q + zero is its length.
+    """
     model, mj = machine.model, machine.mj
     gear, ctrl = float(model.actuator_gear[k, 0]), float(machine.ctrl[k])
     if model.actuator_ctrllimited[k]:
@@ -169,7 +181,8 @@ def _drive(machine: Machine, k: int, zero: float) -> Drive:
     b0, b1, b2 = gain * ctrl + bias
     limits = None
     if model.actuator_forcelimited[k]:
-        low, high = sorted(gear * float(v) for v in model.actuator_forcerange[k])
+        low, high = sorted(pull * gear * float(v) for v in model.actuator_forcerange[k])
         limits = (low, high)
-    constant, kp, kv = gear * b0, -(gear**2) * b1, -(gear**2) * b2
-    return Drive(constant - kp * zero, kp, kv, limits)
+    return Drive(
+        pull * (gear * b0 + gear**2 * b1 * zero), -((pull * gear) ** 2) * b1, -((pull * gear) ** 2) * b2, limits
+    )

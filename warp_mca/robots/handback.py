@@ -11,7 +11,8 @@ import numpy as np
 from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.base.rotation import rotation_matrix, rotation_vector
-from warp_mca.robots.handoff import REST, joint_name
+from warp_mca.robots.gearing import joint_name
+from warp_mca.robots.handoff import REST
 from warp_mca.robots.machine import Machine
 from warp_mca.scene import Body, Scene
 

@@ -13,6 +13,7 @@ from warp_mca.base.errors import bad_value
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.robots.contacts import Contacts
 from warp_mca.robots.drives import compensated, freedom_of, refuse_at_hand_off
+from warp_mca.robots.gearing import Gearing, joint_name
 from warp_mca.robots.masses import MassProperties, of_link
 from warp_mca.scene import Articulation, Body, BodyForce, Fixed, Freedom, Scene
 from warp_mca.scene.phases import ImpactPhase
@@ -61,6 +62,7 @@ class HandOff:
         Raises:
             RequestError: a flexible link is held nowhere, or a surface cannot be made.
         """
+        self._gearing = Gearing(self.machine, impact.duration)
         contacts = Contacts(self.robot, self.machine, self.swing, impact.duration, springs, drawn)
         contacts.add(pairs)
         model = self.machine.model
@@ -68,7 +70,7 @@ class HandOff:
             if self._moves(link) and self.machine.carrier(link) == link:
                 self._add_link(link, contacts)
         for k in range(model.neq):
-            if model.eq_active0[k]:
+            if model.eq_active0[k] and int(model.eq_type[k]) != int(self.machine.mj.mjtEq.mjEQ_JOINT):
                 self._add_loop(k)
         self.bodies += contacts.beside()
         gravity, loads = self._gravity()
@@ -148,7 +150,7 @@ class HandOff:
         body, nodes = self._holder(link, parent)
         other, other_nodes = self._holder(parent, link)
         assert body is not None
-        freedoms = tuple(freedom_of(machine, k, self.swing.qpos) for k in joints)
+        freedoms = tuple(freedom_of(machine, k, self.swing.qpos, self._gearing) for k in joints)
         if any(freedom.kind == "ball" for freedom in freedoms) and len(freedoms) > 1:
             remedy = "a ball beside other joints of one link is not carried; give three hinges, or a link between"
             raise bad_value("Robot: joints of link", self.names.body(link), remedy)
@@ -178,8 +180,8 @@ class HandOff:
         """The joint of an equality constraint."""
         machine, model, mj = self.machine, self.machine.model, self.machine.mj
         name, kind = self.names.equality(k), int(model.eq_type[k])
-        if kind == int(mj.mjtEq.mjEQ_JOINT) or int(model.eq_objtype[k]) != int(mj.mjtObj.mjOBJ_BODY):
-            remedy = "an impact carries connect and weld between bodies; take it out, or hand over before it matters"
+        if int(model.eq_objtype[k]) != int(mj.mjtObj.mjOBJ_BODY):
+            remedy = "an impact carries connect and weld between bodies, not sites; name the bodies"
             raise bad_value("Robot: equality", name, remedy)
         ends = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
         links = [self.machine.carrier(end) for end in ends]
@@ -208,13 +210,6 @@ def mount(robot: Robot, link: str, other: str | None) -> str:
         remedy = f"name the node set that holds it to {held}; its mesh has {sets}"
         raise bad_value(f"Robot.mounts[{link!r}]", given, remedy)
     return found
-
-
-def joint_name(machine: Machine, link: int) -> str:
-    """Name of the joint between a link and its parent: that of the file's joint where it is one."""
-    if int(machine.model.body_jntnum[link]) == 1:
-        return machine.names.joint(int(machine.model.body_jntadr[link]))
-    return f"{machine.names.body(link)} joint"
 
 
 def _rigid(name: str, own: MassProperties, motion: Motion, geometry: Any) -> Body:

@@ -129,7 +129,7 @@ def _add_servos(mj: Any, spec: Any, robot: Robot) -> None:
         RequestError: a joint is not in the file or has an actuator there.
     """
     joints = [joint.name for joint in spec.joints]
-    taken = {actuator.target for actuator in spec.actuators}
+    taken = {actuator.target for actuator in spec.actuators if actuator.trntype != mj.mjtTrn.mjTRN_TENDON}
     for name, servo in robot.servos.items():
         if name not in joints:
             raise bad_value("Robot.servos", name, f"the file's joints are {', '.join(filter(None, joints))}")
@@ -146,7 +146,7 @@ def _add_servos(mj: Any, spec: Any, robot: Robot) -> None:
 def _refused(mj: Any, model: Any) -> Iterator[str]:
     """What a machine does not carry, each with a remedy."""
     counts = {
-        "tendons": model.ntendon,
+        "spatial tendons": int((model.wrap_type != int(mj.mjtWrap.mjWRAP_JOINT)).sum()),
         "flexes": model.nflex,
         "mocap bodies": model.nmocap,
         "plugins": model.nplugin,
@@ -157,6 +157,8 @@ def _refused(mj: Any, model: Any) -> Iterator[str]:
         if count:
             yield f"it has {what} ({count}), which a machine does not carry; take them out"
     names = Names(mj, model)
+    for k in range(model.ntendon):
+        yield from (f"tendon {names.tendon(k)}: {text}" for text in _refused_tendon(model, k))
     for k in range(model.nu):
         yield from (f"actuator {names.actuator(k)}: {text}" for text in _refused_drive(mj, model, k))
     for k in range(model.njnt):
@@ -175,11 +177,19 @@ def _refused(mj: Any, model: Any) -> Iterator[str]:
         yield "it moves in a fluid (density, viscosity or wind of option), which acts on no machine here; take it out"
 
 
+def _refused_tendon(model: Any, k: int) -> Iterator[str]:
+    for what in ("limited", "actfrclimited", "frictionloss", "armature", "stiffnesspoly", "dampingpoly"):
+        given = getattr(model, f"tendon_{what}", None)
+        if given is not None and np.any(given[k]):
+            yield f"it has {what}, which machines do not carry in tendons; give that to joints, or leave it out"
+
+
 def _refused_drive(mj: Any, model: Any, k: int) -> Iterator[str]:
     joints = (int(mj.mjtTrn.mjTRN_JOINT), int(mj.mjtTrn.mjTRN_JOINTINPARENT))
     scalar = (int(mj.mjtJoint.mjJNT_HINGE), int(mj.mjtJoint.mjJNT_SLIDE))
-    if model.actuator_trntype[k] not in joints or model.jnt_type[model.actuator_trnid[k, 0]] not in scalar:
-        yield "it drives no hinge or slide; drive a joint"
+    on_joint = model.actuator_trntype[k] in joints and model.jnt_type[model.actuator_trnid[k, 0]] in scalar
+    if not on_joint and model.actuator_trntype[k] != int(mj.mjtTrn.mjTRN_TENDON):
+        yield "it drives no hinge, slide or fixed tendon; drive one"
     elif model.actuator_dyntype[k] != int(mj.mjtDyn.mjDYN_NONE):
         yield "it has dynamics of its own; give a motor, position or velocity actuator without a time constant"
     elif model.actuator_gaintype[k] not in (int(mj.mjtGain.mjGAIN_FIXED), int(mj.mjtGain.mjGAIN_AFFINE)):
@@ -212,6 +222,10 @@ class Names:
     def actuator(self, k: int) -> str:
         """Of actuator k."""
         return self._name("ACTUATOR", k) or f"actuator{k}"
+
+    def tendon(self, k: int) -> str:
+        """Of tendon k."""
+        return self._name("TENDON", k) or f"tendon{k}"
 
     def equality(self, k: int) -> str:
         """Of equality constraint k."""

@@ -41,8 +41,8 @@ class Robot:
     """A machine in three dimensions from an MJCF or URDF file, which MuJoCo reads (extra `robots`).
 
     Trees of links and loops of equality constraints, with all joint types, limits, springs, damping, dry friction,
-    armature, motors and servos. Fixed links of a URDF stay links. Tendons, flexes, muscles, plugins, mocap bodies and
-    height fields are refused by name.
+    armature, motors and servos, mimic joints and fixed tendons. Fixed links of a URDF stay links. Spatial tendons,
+    flexes, muscles, plugins, mocap bodies and height fields are refused by name.
 
     Attributes:
         path: of the file, with suffix .xml, .mjcf or .urdf.
@@ -138,10 +138,11 @@ class Robot:
 
         Flexible links get their meshes, all others are rigid bodies with the file's mass, centre and inertia. Joints
         are Articulations with springs, dampers, friction, armature, limits and drives, which go on acting at the
-        controls that are held. Of the file's geoms those are meshed that may touch within the impact; a round one has a
-        node where it touches first. Geoms of the world are held. What the file's link has beyond
-        the mass of its mesh rides on it as a rigid body, "NAME rest", to which it is mounted; where they differ by no
-        more than 2 %, the link swings with the mass of its mesh.
+        controls that are held. Joints that equalities gear follow by a `Coupler`; a tendon pulls such joints with its
+        actuators and spring, others with the force it has at the touch. Of the file's geoms those are meshed that may
+        touch within the impact; a round one has a node where it touches first. Geoms of the world are held. What the
+        file's link has beyond the mass of its mesh rides on it as a rigid body, "NAME rest", to which it is mounted;
+        where they differ by no more than 2 %, the link swings with the mass of its mesh.
 
         Args:
             impact: the phase.

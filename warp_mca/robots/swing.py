@@ -14,6 +14,7 @@ from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.rigid.touch import Watch
 from warp_mca.robots.machine import Machine
+from warp_mca.robots.nearby import Nearby
 from warp_mca.robots.touching import Pair
 
 if TYPE_CHECKING:
@@ -106,17 +107,17 @@ def swing(robot: Robot, machine: Machine, pairs: Sequence[Pair], t_end: float, *
     y = np.concatenate([machine.start, np.zeros(2)])
     path = _Path(machine)
     watches = _watches(machine, pairs, y, robot.clock > 0.0) if stops else []
+    nearby = Nearby(machine, pairs, watches, y)
     touch = next(((0.0, k) for k, watch in enumerate(watches) if watch.touching), None)
     if touch and watches[touch[1]].start < -ROUND_OFF:
         remedy = "they still close at the end of the impact; give it a duration at whose end they part"
         raise bad_value(f"gap of {pairs[touch[1]].name} [m]", watches[touch[1]].start, remedy)
     while touch is None and path.times[-1] < t_end:
         until = _sample(robot, machine, path.times[-1], y, t_end)
-        y, touch = path.advance(y, until, watches)
+        y, touch = path.advance(y, until, nearby)
     end = path.times[-1]
     found = _touch(machine, pairs[touch[1]], end, y) if touch else None
-    closest = min((watch.closest for watch in watches), default=(math.inf, end))
-    return _record(machine, path, y, found, closest)
+    return _record(machine, path, y, found, nearby.closest if watches else (math.inf, end))
 
 
 def _sample(robot: Robot, machine: Machine, t: float, y: Array, t_end: float) -> float:
@@ -163,7 +164,7 @@ class _Path:
     def __init__(self, machine: Machine) -> None:
         self._machine, self.times, self.pieces = machine, [0.0], []
 
-    def advance(self, y: Array, until: float, watches: list[Watch]) -> tuple[Array, tuple[float, int] | None]:
+    def advance(self, y: Array, until: float, nearby: Nearby) -> tuple[Array, tuple[float, int] | None]:
         """Go on to a time [s] or the first touch; returns the state, and time and number of the pair that touches.
 
         Raises:
@@ -184,9 +185,7 @@ class _Path:
                 raise bad_value("Robot.qvel", rates, f"the swing broke off at t = {solver.t:g} s: {message}")
             piece = solver.dense_output()
             flow = lambda s, piece=piece: _flow(machine, piece(s))  # noqa: E731
-            end = _flow(machine, solver.y)
-            found = [(watch.advance(flow, solver.t, end), k) for k, watch in enumerate(watches)]
-            touch = min(((t, k) for t, k in found if t is not None), default=None)
+            touch = nearby.advance(flow, solver.t, solver.y)
             if touch is None or touch[0] > self.times[-1]:
                 self.pieces.append(piece)
                 self.times.append(solver.t if touch is None else touch[0])

@@ -14,7 +14,7 @@ from warp_mca.scene.contact_laws import DampedPenalty, Penalty
 from warp_mca.scene.contacts import OVERLAP_CHOICES, Contact, ContactAll, RigidPlane, Surface
 from warp_mca.scene.damping import Damping
 from warp_mca.scene.drives import Fixed, Prescribed
-from warp_mca.scene.freedoms import Controller, Freedom, PositionServo
+from warp_mca.scene.freedoms import Controller, Coupler, Freedom, PositionServo
 from warp_mca.scene.friction_laws import DecayingFriction, ShearCap
 from warp_mca.scene.joints import Prismatic, Revolute, Spherical, Weld
 from warp_mca.scene.loads import BodyForce, Force, Pressure, ThermalStrain, Traction
@@ -39,6 +39,7 @@ __all__ = [
     "Contact",
     "ContactAll",
     "Controller",
+    "Coupler",
     "Cylindrical",
     "DampedPenalty",
     "Damping",

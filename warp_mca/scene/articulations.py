@@ -168,9 +168,33 @@ def check_whole(scene: Scene) -> None:
         for freedom in whole.freedoms:
             if isinstance(freedom.motor, Controller):
                 _check_period(freedom.motor, scene.impact.output_interval)
+            if freedom.follows is not None:
+                _check_coupler(scene, joint, freedom)
         if scene.phases:
             remedy = f"joints between whole bodies, as {joint.title}, take part in the impact alone; leave phases out"
             raise bad_value("Scene.phases", [type(phase).__name__ for phase in scene.phases], remedy)
+
+
+def _check_coupler(scene: Scene, joint: Joint, freedom: Freedom) -> None:
+    """Refuse a coupler to a freedom that is not in the scene, or to its own.
+
+    Raises:
+        RequestError: so it is.
+    """
+    coupler = freedom.follows
+    assert coupler is not None
+    freedoms = {item.name: whole.freedoms for item in scene.joints if (whole := item.whole()) is not None}
+    if coupler.joint not in freedoms:
+        known = ", ".join(sorted(freedoms))
+        raise bad_value("Coupler.joint", coupler.joint, f"joints between whole bodies are {known}; name one of them")
+    found = freedoms[coupler.joint]
+    other = found[coupler.freedom - 1] if coupler.freedom <= len(found) else None
+    if other is None or other.kind == "ball":
+        scalar = [str(k + 1) for k, item in enumerate(found) if item.kind != "ball"]
+        remedy = f"hinges and slides of {coupler.joint} have the numbers {', '.join(scalar) or 'none'}; name one"
+        raise bad_value("Coupler.freedom", coupler.freedom, remedy)
+    if other is freedom and coupler.joint == joint.name:
+        raise bad_value("Coupler.joint", coupler.joint, "a freedom cannot follow itself; name another one")
 
 
 def _check_independent(title: str, whole: Whole) -> None:

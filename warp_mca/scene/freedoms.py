@@ -90,6 +90,27 @@ class Controller:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Coupler:
+    """Makes a freedom move in proportion to another one, as gears, belts, racks and mimic joints do, without play.
+
+    Attributes:
+        joint: name of the joint that has the other freedom.
+        freedom: number of that among the freedoms there, from 1.
+        ratio: way of this freedom over that of the other one [-], or [m/rad], [rad/m] between a slide and a hinge.
+    """
+
+    joint: str
+    freedom: int = 1
+    ratio: float = 1.0
+
+    def __post_init__(self) -> None:
+        validate.plain(self)
+        validate.texts("Coupler", joint=self.joint)
+        validate.counts("Coupler", freedom=self.freedom)
+        validate.within("Coupler", -MOST, MOST, ratio=self.ratio)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Freedom:
     """A hinge or a slide along an axis, or a ball joint about a point, of a joint between whole bodies.
 
@@ -115,6 +136,7 @@ class Freedom:
         limit_damping: of a damper that acts beyond the limits [N m s/rad], [N s/m].
         motor: torque [N m] or force [N] over time as an `Amplitude`, a `PositionServo`, or a `Controller`; times count
             from the start of the impact phase.
+        follows: another freedom to which this one is geared; forces of the gear do no work. None for none.
     """
 
     kind: Literal["hinge", "slide", "ball"] = "hinge"
@@ -131,6 +153,7 @@ class Freedom:
     limit_stiffness: float = 1e6
     limit_damping: float = 0.0
     motor: Amplitude | PositionServo | Controller | None = None
+    follows: Coupler | None = None
 
     def __post_init__(self) -> None:
         validate.plain(self)
@@ -159,11 +182,12 @@ class Freedom:
                 raise bad_value(f"{owner}.limit_stiffness", self.limit_stiffness, remedy)
         remedy = "give an Amplitude of torques, a PositionServo, a Controller, or None"
         validate.kinds(owner, (Amplitude, PositionServo, Controller, NoneType), remedy, motor=self.motor)
+        validate.kinds(owner, (Coupler, NoneType), "give a Coupler, or None", follows=self.follows)
         if self.kind == "ball":
             self._check_ball(owner)
 
     def _check_ball(self, owner: str) -> None:
-        for name in ("position", "stiffness", "friction", "armature", "limits", "motor"):
+        for name in ("position", "stiffness", "friction", "armature", "limits", "motor", "follows"):
             if getattr(self, name):
                 remedy = "a ball has no axis for it; leave it out, or give three hinges whose axes meet"
                 raise bad_value(f"{owner}.{name}", validate.brief(getattr(self, name)), remedy)

@@ -65,6 +65,9 @@ class RigidRow:
         twist: axis of a row that holds a direction of a pin [-], shape (3,), float64; n is 0 there.
         joint: place in `Model.body_joints` of the joint that finds the direction itself, -1 of other rows.
         rate: of that joint that the row holds back, -1 of rows that hold the joint.
+        geared, leader: places in `Model.body_joints` of the joints whose rates a coupler ties, -1 of other rows.
+        rates: of these two joints.
+        ratio: of the coupler: rate of the one over that of the other.
     """
 
     first: int = field(metadata=of("rigid bodies"))
@@ -77,6 +80,10 @@ class RigidRow:
     twist: Array = field(default_factory=lambda: np.zeros(3), metadata=AS_IS)
     joint: int = field(default=-1, metadata=of("body joints"))
     rate: int = field(default=-1, metadata=AS_IS)
+    geared: int = field(default=-1, metadata=of("body joints"))
+    leader: int = field(default=-1, metadata=of("body joints"))
+    rates: tuple[int, int] = field(default=(0, 0), metadata=AS_IS)
+    ratio: float = field(default=0.0, metadata=AS_IS)
 
 
 @joinable

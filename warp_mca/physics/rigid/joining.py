@@ -12,6 +12,7 @@ from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
 from warp_mca.base.rotation import mean_spin, point_velocity, rotation_matrix
 from warp_mca.kernels.nodes import joint_arrays as columns
+from warp_mca.physics.rigid.couplers import coupler_rows
 from warp_mca.scene.amplitude import CONSTANT, Amplitude
 from warp_mca.scene.freedoms import Controller, Freedom, PositionServo, Whole
 from warp_mca.scene.joints import Joint
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
 APART = 1e-6  # of a joint's extent: distance of the points of both bodies, at most
 ASTRAY = 1e-6  # of the speeds of both bodies: part of their relative motion that a joint does not allow, at most
+STILL = 1e-6  # speed [m/s] below which ASTRAY of it is rounding
 FLAT = 1e-3  # of a cluster's extent: distance from a line below which nodes are on it
 KINDS = {"hinge": columns.HINGE, "slide": columns.SLIDE, "ball": columns.BALL}
 
@@ -56,6 +58,7 @@ def join_whole(
     joints: list[BodyJoint] = []
     rows: list[RigidRow] = []
     pins: list[RigidPin] = []
+    rates: list[tuple[Array, Array]] = []
     place = {body.name: k for k, body in enumerate(bodies)}
     for joint, own in zip(parts.scene.joints, found, strict=True):
         whole = joint.whole()
@@ -64,7 +67,7 @@ def join_whole(
         a, b = place.get(joint.body, GROUND), place.get(joint.other or "", GROUND)
         nodes = pairs["joint_first"][own.start : own.end]
         item = _body_joint(parts, joint, whole, bodies, a, b, first_pin + len(pins) if len(nodes) else -1)
-        _check_motion(joint, item, bodies, parts, velocity, nodes)
+        rates.append(_start_rates(joint, item, bodies, parts, velocity, nodes))
         if len(nodes):
             pins.append(_pin(parts, joint, item, own, max(a, b), nodes))
         first, second = (b, GROUND) if item.soft else (a, b)
@@ -82,7 +85,7 @@ def join_whole(
             for k in range(6)
         ]
         joints.append(item)
-    return Joined(tuple(joints), tuple(rows), tuple(pins))
+    return Joined(tuple(joints), (*rows, *coupler_rows(parts.scene, joints, rates)), tuple(pins))
 
 
 def _frame(parts: Bodies, body: str | None) -> tuple[Array, Array]:
@@ -199,13 +202,13 @@ def _pin(parts: Bodies, joint: Joint, item: BodyJoint, own: JointPairs, body: in
     )
 
 
-def _check_motion(
+def _start_rates(
     joint: Joint, item: BodyJoint, bodies: Sequence[RigidBody], parts: Bodies, velocity: Array, nodes: Index
-) -> None:
-    """Refuse bodies whose velocities at the start a joint does not allow.
+) -> tuple[Array, Array]:
+    """Rates of a joint at the start, and those that give its bodies their speed [rad/s], [m/s], (rate_count,), float64.
 
     Raises:
-        RequestError: it does not.
+        RequestError: the bodies have velocities that it does not allow.
     """
     motions, speed = [], 0.0
     for k in (item.body, item.other):
@@ -219,8 +222,11 @@ def _check_motion(
     relative = motions[0] - motions[1]
     twist = np.concatenate([item.length * relative[0], relative[1]])
     screws = item.screws()
-    left = twist - screws.T @ np.linalg.lstsq(screws.T, twist, rcond=None)[0] if len(screws) else twist
-    if np.linalg.norm(left) > ASTRAY * speed:
+    rates = np.linalg.lstsq(screws.T, twist, rcond=None)[0] if len(screws) else np.zeros(0)
+    left = twist - screws.T @ rates
+    if np.linalg.norm(left) > ASTRAY * max(speed, STILL):
         what = f"part of their relative velocity at the start, {np.linalg.norm(left):.3g} m/s, it does not allow"
         bound = f"{joint.body} and {joint.other or 'the ground'}"
         raise bad_value(f"{joint.title}.body", joint.body, f"it joins {bound}, and {what}; give both one that fits")
+    sizes = np.linalg.norm(screws, axis=1) if len(screws) else np.zeros(0)
+    return np.asarray(rates, dtype=np.float64), max(speed, STILL) / sizes

@@ -145,7 +145,23 @@ class RigidStage(Actor):
             first = self.joints.rates
             rates = [first[row.joint] + row.rate if row.rate >= 0 else -1 for row in rows]
             found.rate = wp.array(rates, dtype=wp.int32)
+            self._make_couplers(found, rows)
         self.rows, self.entries = found, int((count**2).sum())
+
+    def _make_couplers(self, found: Any, rows: Sequence[RigidRow]) -> None:
+        """Rows of the two rates that each coupler ties, its ratio, and what its positions differ by at the start."""
+        assert self.joints is not None
+        items, parts, offset = self.joints.items, np.full((len(rows), 2), -1), np.zeros(len(rows))
+        place = {(row.joint, row.rate): r for r, row in enumerate(rows) if row.rate >= 0}
+        for r, row in enumerate(rows):
+            if row.geared >= 0:
+                ends = list(zip((row.geared, row.leader), row.rates, strict=True))
+                parts[r] = [place[end] for end in ends]
+                one, other = (items[j].position[k] for j, k in ends)
+                offset[r] = one - row.ratio * other
+        found.part = wp.array(parts, dtype=wp.vec2i)
+        found.ratio = wp.array([row.ratio for row in rows], dtype=wp.float64)
+        found.offset = wp.array(offset, dtype=wp.float64)
 
     def _make_pins(self, pins: Sequence[RigidPin], constraints: ConstraintStage) -> None:
         items, found = [pins[p] for p in self.pin_order], Clusters()

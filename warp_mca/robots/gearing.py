@@ -1,0 +1,176 @@
+"""Owns what mimic joints and fixed tendons are in an impact: couplers of freedoms, and drives and springs of joints.
+
+Joints that equalities gear to each other move as one: q_i = f_i q + g_i of the one that none of them leads. A tendon of
+such joints has the length l = pull q + zero, with pull = sum c_i f_i, and its tension is a torque of `pull` times as
+much there. Impulses of couplers carry it to the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from warp_mca.base.errors import bad_value
+from warp_mca.base.log import warn
+from warp_mca.robots.drives import Drive, drive_of
+from warp_mca.scene import Coupler
+
+if TYPE_CHECKING:
+    from warp_mca.robots.machine import Machine
+
+
+class Gearing:
+    """Couplers and tendons of a machine at its hand-off, whose data is up to date."""
+
+    def __init__(self, machine: Machine, duration: float) -> None:
+        """Read equalities and tendons; `duration` of the impact [s] says how much of what is held would change.
+
+        Raises:
+            RequestError: a joint is held at a place or geared twice, or springs of a tendon are not carried.
+        """
+        self._machine, self._duration = machine, duration
+        self._leader: dict[int, tuple[int, float]] = {}
+        for k in range(machine.model.neq):
+            if machine.model.eq_active0[k] and int(machine.model.eq_type[k]) == int(machine.mj.mjtEq.mjEQ_JOINT):
+                self._gear(k)
+        self._drives: dict[int, list[Drive]] = {}
+        self._springs: dict[int, list[tuple[float, float, float]]] = {}
+        for tendon in range(machine.model.ntendon):
+            self._pull(tendon)
+
+    def coupler(self, joint: int) -> Coupler | None:
+        """That of a joint, or None."""
+        if joint not in self._leader:
+            return None
+        leader, ratio = self._leader[joint]
+        model = self._machine.model
+        link = int(model.jnt_bodyid[leader])
+        number = 1 + leader - int(model.body_jntadr[link])
+        return Coupler(joint=joint_name(self._machine, link), freedom=number, ratio=ratio)
+
+    def drives(self, joint: int) -> list[Drive]:
+        """Torques of actuators of tendons on a joint."""
+        return self._drives.get(joint, [])
+
+    def spring(self, joint: int, stiffness: float, rest: float) -> tuple[float, float, float]:
+        """Stiffness, rest and damping of a joint's own spring and those of tendons together."""
+        damping = 0.0
+        for k, at, c in self._springs.get(joint, []):
+            if k:
+                stiffness, rest = stiffness + k, (stiffness * rest + k * at) / (stiffness + k)
+            damping += c
+        return stiffness, rest, damping
+
+    def _gear(self, k: int) -> None:
+        """Take equality k between joints: q_1 - q_1(0) = p(q_2 - q_2(0)), p a polynomial."""
+        machine, model = self._machine, self._machine.model
+        name, (one, other) = machine.names.equality(k), (int(model.eq_obj1id[k]), int(model.eq_obj2id[k]))
+        if other < 0:
+            remedy = f"it holds joint {machine.names.joint(one)} at a place; leave that joint out, which welds its link"
+            raise bad_value("Robot: equality", name, remedy)
+        place, dof = int(model.jnt_qposadr[other]), int(model.jnt_dofadr[other])
+        p = np.polynomial.Polynomial(model.eq_data[k, :5])
+        x, rate = float(machine.data.qpos[place] - model.qpos0[place]), float(machine.data.qvel[dof])
+        ratio, turns = float(p.deriv()(x)), float(p.deriv(2)(x))
+        if one in self._leader and ratio and self._root(other)[0] != self._root(one)[0] and other not in self._leader:
+            one, other, ratio = other, one, 1.0 / ratio
+        if one in self._leader or self._root(other)[0] == one:
+            remedy = "other equalities gear this joint already; leave one of them out"
+            raise bad_value("Robot: equality", name, remedy)
+        self._leader[one] = (other, ratio)
+        if turns:
+            change = abs(turns * rate) * self._duration
+            text = (
+                f"equality {name} has the ratio {ratio:.6g} in the impact, which {change:.2g} of the way would change"
+            )
+            warn([f"{text}; the file's polynomial is linear there"])
+
+    def _root(self, joint: int) -> tuple[int, float]:
+        """The joint that leads a joint in the end, and the rate of the one over that of the other."""
+        factor = 1.0
+        while joint in self._leader:
+            joint, ratio = self._leader[joint]
+            factor *= ratio
+        return joint, factor
+
+    def _pull(self, tendon: int) -> None:
+        """Take a tendon: its actuators, spring and damper."""
+        machine, model = self._machine, self._machine.model
+        parts = list(_parts(machine, tendon))
+        actuators = [] if machine.passive else _actuators(machine, tendon)
+        stiffness, damping = float(model.tendon_stiffness[tendon]), float(model.tendon_damping[tendon])
+        if not parts or not (actuators or stiffness or damping):
+            return
+        for joint, _ in parts:
+            if model.jnt_actfrclimited[joint] and actuators:
+                name, remedy = (
+                    machine.names.joint(joint),
+                    "a tendon pulls it, whose actuator has limits itself; leave it out",
+                )
+                raise bad_value(f"actuatorfrcrange of joint {name}", True, remedy)
+        roots = {self._root(joint)[0] for joint, _ in parts}
+        if len(roots) > 1:
+            self._hold(tendon, parts, actuators, bool(stiffness or damping))
+            return
+        (root,) = roots
+        pull = sum(c * self._root(joint)[1] for joint, c in parts)
+        place = int(model.jnt_qposadr[root])
+        position = float(machine.data.qpos[place] - model.qpos0[place])
+        zero = float(machine.data.ten_length[tendon]) - pull * position
+        self._drives.setdefault(root, []).extend(drive_of(machine, k, pull, zero) for k in actuators)
+        low, high = (float(v) for v in model.tendon_lengthspring[tendon])
+        if stiffness and low != high:
+            remedy = "its spring is slack between two lengths, which an impact does not carry; give it one springlength"
+            raise bad_value("Robot: tendon", machine.names.tendon(tendon), remedy)
+        if pull and (stiffness or damping):
+            own = (stiffness * pull**2, (low - zero) / pull, damping * pull**2)
+            self._springs.setdefault(root, []).append(own)
+
+    def _hold(self, tendon: int, parts: list[tuple[int, float]], actuators: list[int], sprung: bool) -> None:
+        """Hold the force of actuators of a tendon whose joints are free of each other, and say what that neglects."""
+        machine, model, data = self._machine, self._machine.model, self._machine.data
+        name = machine.names.tendon(tendon)
+        if sprung:
+            remedy = (
+                "its joints are free of each other, and an impact carries no spring or damper there; leave these out"
+            )
+            raise bad_value("Robot: tendon", name, remedy)
+        speed = abs(float(data.ten_velocity[tendon]))
+        for k in actuators:
+            force = float(data.actuator_force[k] * model.actuator_gear[k, 0])
+            for joint, c in parts:
+                self._drives.setdefault(joint, []).append(Drive(c * force, 0.0, 0.0, None))
+            law = drive_of(machine, k, 1.0, 0.0)
+            if law.kp or law.kv:
+                change = abs(law.kp) * speed * self._duration
+                text = (
+                    f"actuator {machine.names.actuator(k)} pulls joints that are free of each other, by tendon {name}"
+                )
+                what = (
+                    f"its {force:.4g} N are held in the impact; they would change by {change:.2g} N at the rate before"
+                )
+                warn([f"{text}: {what} and by {abs(law.kv):.3g} N for each m/s that this changes"])
+
+
+def _parts(machine: Machine, tendon: int) -> Iterator[tuple[int, float]]:
+    """Joints of a fixed tendon, and the coefficient of each."""
+    model = machine.model
+    first = int(model.tendon_adr[tendon])
+    for k in range(first, first + int(model.tendon_num[tendon])):
+        if model.wrap_prm[k]:
+            yield int(model.wrap_objid[k]), float(model.wrap_prm[k])
+
+
+def _actuators(machine: Machine, tendon: int) -> list[int]:
+    model = machine.model
+    own = model.actuator_trntype == int(machine.mj.mjtTrn.mjTRN_TENDON)
+    return [int(k) for k in np.flatnonzero(own & (model.actuator_trnid[:, 0] == tendon))]
+
+
+def joint_name(machine: Machine, link: int) -> str:
+    """Name of the joint between a link and its parent: that of the file's joint where it is one."""
+    if int(machine.model.body_jntnum[link]) == 1:
+        return machine.names.joint(int(machine.model.body_jntadr[link]))
+    return f"{machine.names.body(link)} joint"
