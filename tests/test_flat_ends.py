@@ -172,3 +172,30 @@ def test_a_block_that_slides_as_it_spins_is_not_said_to_creep():
 def test_built_in_blocks_do_not_creep(name: str):
     result = finished(mca.make_scene(name))
     assert not any("creep" in warning for warning in result_of(result).warnings)
+
+
+@pytest.mark.parametrize("penalty", [None, "auto"])
+@pytest.mark.parametrize("nu", [0.39, 0.49, 0.499])
+def test_springs_of_rubber_carry_the_force_of_its_wave(nu: float, penalty: str | None):
+    """A block that cannot spread: Z A v for 2 L / c. Springs of E / (1 - nu^2) took half of it at nu = 0.49."""
+    rubber = mca.NeoHookean(C10=0.4e6, nu=nu, rho=1100.0)
+    G, speed = 0.8e6, 0.5
+    c = math.sqrt((2.0 * G * (1.0 + nu) / (3.0 * (1.0 - 2.0 * nu)) + 4.0 * G / 3.0) / 1100.0)
+    box = mca.Box(size=(0.02, 0.01, 0.01), divisions=(10, 1, 1))
+    pad = mca.Body(
+        name="pad", geometry=box, material=rubber, element="hex8", kinematics="finite", velocity=(-speed, 0.0, 0.0)
+    )
+    slave, wall = mca.Surface(body="pad", nodes="xmin"), mca.RigidPlane(normal=(1.0, 0.0, 0.0))
+    scene = mca.Scene(
+        name="confined",
+        bodies=(pad,),
+        contacts=(mca.Contact(slave=slave, master=wall, penalty=penalty),),
+        fixed=tuple(mca.Fixed(body="pad", nodes=axis + end, axes=axis) for axis in "yz" for end in ("min", "max")),
+        impact=mca.ImpactPhase(duration=0.08 / c, output_interval=1e-3 / c),
+    )
+    result = mca.run(scene)
+    wave = 1100.0 * c * 1e-4 * speed
+    assert result.F_n.max() > 0.9 * wave
+    if penalty is None:  # "auto" rings, with the same stiffness
+        assert result.F_n.max() < 1.1 * wave
+        assert result.summary["contact_duration"] == pytest.approx(0.04 / c, rel=0.25)

@@ -110,7 +110,8 @@ class Contact(_Springs):
         mu: coefficient of friction [-], the one at rest where `friction` has laws; 0 runs no friction at all.
         penalty: factor f of the penalty stiffness k = f K A^2 / V [-]. None takes E / (1 - nu^2) in place of K, and
             f = 3.8 where a surface is curved. Where both are flat, nodes share, by their area, springs that are as
-            stiff as two cells of each surface, so that flat ends do not ring. "auto" chooses f from mesh, curvature,
+            stiff as two cells of each surface, so that flat ends do not ring; from nu = 0.39 on cells that cannot
+            spread. "auto" chooses f from mesh, curvature,
             mass and speed, so that springs hold at most some 7 % of the energy.
         stiffness: of the spring of each slave node in place of that [N/m], whatever its faces; with two_way of each
             node of the master too. For rigid bodies, whose cells say nothing of it.

@@ -150,7 +150,7 @@ def check_alike(scenes: Sequence[Scene], duration: float | None = None) -> float
             raise bad_value(f"scenes[{k}].t_end", scene.t_end, remedy)
         if scene.phases:
             remedy = "the scenes of a batch begin together with the impact; leave phases out, or use mca.run"
-            raise bad_value(f"scenes[{k}].phases", validate.brief(scene.phases), remedy)
+            raise bad_value(f"scenes[{k}].phases", scene.phases, remedy)
     first = scenes[0]
     span = span_of(first, duration)
     for k, scene in enumerate(scenes[1:], 1):

@@ -48,7 +48,8 @@ class Faces:
         across: length of the longest diagonal or edge [m], shape (face_count,), float64.
         bulk: K A^2 / V of each face [N/m], shape (face_count,), float64.
         contact: E* A^2 / V of each face, with E* = E / (1 - nu^2) [N/m], shape (face_count,), float64.
-        layer: E* A / d of each face, with the height d of its cell over it [N/m], shape (face_count,), float64.
+        layer: M A / d of each face, with M of `flat_modulus` and the height d of its cell over it [N/m], shape
+            (face_count,), float64.
     """
 
     node: Index

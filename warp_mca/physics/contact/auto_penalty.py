@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warp_mca.base.arrays import Array
-from warp_mca.physics.contact.stiffness import FLAT, nearest_faces
+from warp_mca.physics.contact.stiffness import FLAT, flat_modulus, nearest_faces
 from warp_mca.scene import Contact, RigidPlane, Surface
 from warp_mca.system.bodies import Bodies
 from warp_mca.system.contact import ChosenPenalty, Faces
@@ -61,6 +61,11 @@ class _Side:
         bulk = float(K[faces.element[k]])
         return bulk * float(faces.contact[k] / faces.bulk[k]), bulk, float(faces.bulk[k] / faces.area[k])
 
+    def flat_modulus(self, K: Array, G: Array) -> float:
+        """Modulus of springs of flat ends [Pa], of the element there."""
+        one = self.faces.element[self.face : self.face + 1]
+        return float(flat_modulus(np.array([self.moduli(K)[0]]), K[one], G[one])[0])
+
 
 def chosen_penalty(
     parts: Bodies, contact: Contact, slave: Faces, master: Faces | None, velocity: Array
@@ -69,7 +74,9 @@ def chosen_penalty(
     own, other, normal = _nearest(contact, slave, master)
     sides = [own] if other is None else [own, other]
     found = [side.moduli(parts.K) for side in sides]
-    default = FLAT * min(modulus / bulk for modulus, bulk, _ in found)
+    default = FLAT * min(
+        side.flat_modulus(parts.K, parts.G) / bulk for side, (_, bulk, _) in zip(sides, found, strict=True)
+    )
     modulus = 1.0 / sum(1.0 / item[0] for item in found)
     curvature = sum(side.curvature for side in sides)
     if curvature <= 0.0:

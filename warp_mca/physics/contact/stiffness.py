@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 # are stiffer ring, because they close more quickly than waves leave the first cells. Few nodes carry a curved contact,
 # so that softer springs lower its force peak: at nu = 0.3 it has penalty = 5; see docs/measurements/methods.md.
 FLAT, CURVED = 0.5, 3.792
+CONFINED = 0.6  # share of the modulus of uniaxial strain that flat ends take at least; it is above E* from nu = 0.39 on
 GLUED = 2.0  # of bonds between flat surfaces, as compliant as one cell: with FLAT a wave came 4 % late through a bond
 SHARE = 0.16  # stiffness of two edges that cross over that of a node: its ends may bear a node and a crossing at once
 
@@ -47,6 +48,19 @@ def nearest_faces(contact: Contact, slave: Faces, master: Faces | None) -> tuple
     return nearest, int(face[nearest])
 
 
+def flat_modulus(contact: Array, K: Array, G: Array) -> Array:
+    """Modulus E* [Pa] of elements under flat contact, or a share of that of uniaxial strain, shape (element_count,).
+
+    Cells under a flat end do not spread at first. Waves there go with K + 4 G / 3, far above E* where Poisson's ratio
+    is near 0.5: springs of E* would close more slowly than such a wave lasts, and most of its force would be missing.
+
+    Args:
+        contact: E* = E / (1 - nu^2) [Pa], shape (element_count,).
+        K, G: bulk and shear modulus [Pa], shape (element_count,).
+    """
+    return np.maximum(contact, CONFINED * (K + 4.0 / 3.0 * G))
+
+
 def is_flat(slave: Faces, master: Faces | None) -> bool:
     """Whether no surface of a contact is curved, which decides on the default stiffness."""
     surfaces = [slave] if master is None else [slave, master]
@@ -59,10 +73,10 @@ def spring_stiffness(
     """Penalty stiffness [N/m] of the nodes and of the faces of the slave, and of the master where it has faces.
 
     A number f gives f K A^2 / V, and a node the mean of the faces around it. The default takes E* in place of K, so
-    that it suits any Poisson's ratio, and is stiffer where one of the surfaces is curved. Where both are flat, nodes
-    share the stiffness of faces as they share their area, so that their pressure is uniform, and the springs of the
-    two surfaces are in series. Two passes of one contact have half of it each. `flat` is what `is_flat` says; of
-    surfaces that change, what it said at the start. `Contact.stiffness` is that of each node.
+    that it suits any Poisson's ratio, and is stiffer where one of the surfaces is curved. Where both are flat, it takes
+    `flat_modulus`, nodes share the stiffness of faces as they share their area, so that their pressure is uniform, and
+    the springs of the two surfaces are in series. Two passes of one contact have half of it each. `flat` is what
+    `is_flat` says; of surfaces that change, what it said at the start. `Contact.stiffness` is that of each node.
     """
     surfaces = [slave] if master is None else [slave, master]
     if (k := contact.stiffness) is not None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from warp_mca.geometry.cell_types import is_triangle
 from warp_mca.physics.contact.friction_laws import friction_values
 from warp_mca.physics.contact.sides import face_geometry, find_sides, is_curved, stiffest_fold
-from warp_mca.physics.contact.stiffness import node_mean, spring_stiffness
+from warp_mca.physics.contact.stiffness import flat_modulus, node_mean, spring_stiffness
 from warp_mca.scene import Contact, ContactAll, RigidPlane, Surface
 from warp_mca.scene.contact_laws import law_values
 from warp_mca.system.bodies import Bodies
@@ -37,10 +37,9 @@ def make_faces(
     contact = 4.0 * G * (3.0 * K + G) / (3.0 * K + 4.0 * G)  # E / (1 - nu^2)
     corner = X[face]
     middle, across = corner.mean(axis=1), np.linalg.norm(corner[:, :, None] - corner[:, None], axis=3).max(axis=(1, 2))
-    bulk, own = K * area**2 / volume, contact * area**2 / volume
-    return Faces(
-        face, element, area, normal, middle, across, bulk, own, own if height is None else own / height[element]
-    )
+    bulk, own, flat = (modulus * area**2 / volume for modulus in (K, contact, flat_modulus(contact, K, G)))
+    layer = flat if height is None else flat / height[element]
+    return Faces(face, element, area, normal, middle, across, bulk, own, layer)
 
 
 def faces_of(parts: Bodies, body: str, node: Index, element: Index) -> Faces:
