@@ -1,6 +1,7 @@
 """Welds, ball joints and slides: closed forms, momentum, and what is refused."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -325,3 +326,36 @@ def test_a_weld_of_unequal_meshes_says_how_many_nodes_it_binds():
     assert text.startswith(
         "joint w binds 4 of the 16 nodes zmin of upper to the 25 nodes zmax of lower; the others are"
     )
+
+
+def test_pins_of_rigid_bodies_whose_axes_cross_are_a_wrist():
+    """Two hinges through the middle of a cube: each spin stays, and the second axis turns with the first one.
+
+    Their nodes would be the same; between rigid bodies they need none. With a flexible one they are refused as before.
+    """
+    middle, first, second, span = (0.02,) * 3, 5.0, 3.0, 0.02
+    cube = mca.Box(size=(0.04,) * 3, divisions=(4,) * 3)
+
+    def body(name: str, spin: tuple[float, float, float], rigid: bool = True) -> mca.Body:
+        about = tuple(np.cross(middle, spin))
+        metal = mca.Elastic(E=70e9, nu=0.3, rho=2700.0)
+        return mca.Body(name=name, geometry=cube, material=metal, rigid=rigid, angular_velocity=spin, velocity=about)
+
+    def hinge(name: str, on: str, other: str | None, axis: tuple[float, float, float]) -> mca.Revolute:
+        return mca.Revolute(
+            name=name, body=on, other=other, at=middle, other_at=middle, axis=axis, nodes="pin", pin_radius=0.012
+        )
+
+    scene = mca.Scene(
+        name="wrist",
+        bodies=(body("b", (0.0, 0.0, first)), body("c", (second, 0.0, first))),
+        joints=(hinges := (hinge("one", "b", None, (0.0, 0.0, 1.0)), hinge("two", "c", "b", (1.0, 0.0, 0.0)))),
+        impact=mca.ImpactPhase(duration=span),
+    )
+    found = mca.run(scene, precision="float64").summary["rigid_bodies"]
+    turn = first * span
+    rates = {name: np.array(own["spin"]) / own["inertia"][0][0] for name, own in found.items()}
+    assert rates["b"] == pytest.approx([0.0, 0.0, first], abs=1e-3)
+    assert rates["c"] == pytest.approx([second * np.cos(turn), second * np.sin(turn), first], abs=0.01)
+    with pytest.raises(mca.RequestError, match="a node is tied twice"):
+        mca.run(replace(scene, bodies=tuple(replace(one, rigid=False) for one in scene.bodies), joints=hinges))

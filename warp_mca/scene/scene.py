@@ -24,6 +24,7 @@ from warp_mca.scene.phases import PHASES, ImpactPhase, RigidPhase, check_t_end
 from warp_mca.scene.probes import Path, Point
 from warp_mca.scene.sensors import Probe, Section, check_class
 from warp_mca.scene.tied_surfaces import Tie
+from warp_mca.scene.wrists import without_shared_nodes
 
 _PARTS = {
     "bodies": Body,
@@ -143,6 +144,7 @@ class Scene:
         for field_name, body in self._named_bodies():
             if body not in names:
                 raise bad_value(field_name, body, f"the scene's bodies are {', '.join(names)}")
+        object.__setattr__(self, "joints", without_shared_nodes(self))
         check_whole(self)
         check_bolts(self)
         if self.general and not self.general_pairs():
