@@ -12,7 +12,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from benchmarks import knobs
+from benchmarks import knobs, short_runs
 from benchmarks.blocks import SIZES
 from benchmarks.measurements import FOLDER, measured
 
@@ -157,6 +157,15 @@ def startup(devices: list[Data]) -> str:
     return table(["device", "cache", *found[0][2]], lines)
 
 
+def short(paths: list[Path]) -> str:
+    """Table of short runs, from the file that has them."""
+    files = [json.loads(path.read_text(encoding="utf-8")) for path in paths]
+    return (
+        "\n\n".join(table(short_runs.head(d), short_runs.lines(d)) for d in files if "short" in d)
+        or "Not measured yet."
+    )
+
+
 def host(devices: list[Data]) -> str:
     """Microseconds of a step on host and device."""
     keys = {
@@ -243,6 +252,7 @@ def render(paths: list[Path]) -> str:
         "memory": sections(devices, memory),
         "startup": startup(devices),
         "host": host(devices),
+        "short": short(paths),
         "knobs": sections(devices, lambda d: table(knobs.HEAD, knobs.lines(d["knobs"])) if "knobs" in d else ""),
         "peers": peers([r for r in rows if r["problem"] != "taylor"]),
         "peers_taylor": peers_taylor([r for r in rows if r["problem"] == "taylor"]),

@@ -24,6 +24,7 @@ from warp_mca.verify.statics import Statics
 from warp_mca.watch.bending import bending_flow, samples_of, seen
 from warp_mca.watch.bent_cells import COLUMNS, FLOW, FLOWING, MISSED, RIGHT, SPENT
 from warp_mca.watch.bent_hexahedra import DEEP
+from warp_mca.watch.bent_scenes import Together
 
 CUTS = {  # of a hexahedron into two wedges, whose axes go along its edges
     "along": ((0, 3, 7, 1, 2, 6), (0, 7, 4, 1, 6, 5)),
@@ -205,6 +206,24 @@ def test_energy_spent_is_that_of_the_element(element: str, kind: str):
     expected = float(held.energies()[[0, 4]].sum())
     (sums,) = seen(model, samples_of(model), u, np.zeros((0, 6)))
     assert sums[SPENT] == pytest.approx(expected, rel=2e-3)
+
+
+@pytest.mark.parametrize("element", ["hex8", "hex8i", "hex8r", "tet4"])
+def test_scenes_that_are_looked_at_together_have_what_each_has_alone(element: str):
+    """Of two meshes and materials, one of which yields, one scene without numbers, and one that held more before."""
+    sizes = [(0.3, 0.2, 0.2), (0.35, 0.2, 0.1), (0.3, 0.2, 0.2), (0.3, 0.2, 0.2)]
+    kind = "tet" if element == "tet4" else "deep"
+    soft = dataclasses.replace(METAL, sigma_y=1e-4 * METAL.E)
+    metals = (METAL, METAL, soft, METAL)
+    models = [model_of(grid(s, (2, 2, 1), kind), m, element) for s, m in zip(sizes, metals, strict=True)]
+    u = [1e-4 * np.random.default_rng(k).uniform(-1.0, 1.0, model.X.shape) for k, model in enumerate(models)]
+    u[3][0] = np.nan
+    before = [np.zeros((0, COLUMNS)), np.full((1, COLUMNS), 1e30), np.zeros((1, COLUMNS)), np.ones((1, COLUMNS))]
+    scenes = [(model, samples_of(model)) for model in models]
+    found = Together(scenes).seen(np.concatenate(u), before)
+    for (model, samples), own, old, new in zip(scenes, u, before, found, strict=True):
+        np.testing.assert_allclose(new, seen(model, samples, own, old), rtol=1e-12)
+    assert found[0][0, SPENT] > 0.0 and found[1][0, SPENT] == 1e30 and (found[3] == 1.0).all()
 
 
 def bent(model: Model, curvature: float, across: float) -> np.ndarray:

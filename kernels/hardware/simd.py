@@ -20,6 +20,7 @@ _PREAMBLE = """
 #pragma clang diagnostic ignored "-Wpass-failed"
 #define for _Pragma("clang loop vectorize(assume_safety) vectorize_width(8) interleave(disable)") for
 """
+_BUILD = wp.ModuleBuildOptions(extra_cpu_preamble=_PREAMBLE)
 
 
 def vectorised(kernel: Any, large: bool = False) -> Any:
@@ -28,10 +29,12 @@ def vectorised(kernel: Any, large: bool = False) -> Any:
     A `large` kernel would remain a function call, or a loop of unknown length, which prevents vectorisation: limits are
     raised for it.
     """
-    options: dict[str, object] = {"extra_build_options": wp.ModuleBuildOptions(extra_cpu_preamble=_PREAMBLE)}
+    options: dict[str, object] = {"extra_build_options": _BUILD}
     flags = wp.config.cpu_compiler_flags
     if large and flags:
         raised = re.sub(r"(-inline-threshold=)\d+", rf"\g<1>{_INLINE_THRESHOLD}", flags)
         options["cpu_compiler_flags"] = f"{raised} -mllvm=-memssa-check-limit={_ACCESSES}"
-    wp.set_module_options(options, module=kernel.module)
+    known = kernel.module.options
+    if any(known.get(name) != value for name, value in options.items()):  # Warp hashes a module anew that was set
+        wp.set_module_options(options, module=kernel.module)
     return kernel

@@ -13,13 +13,9 @@ CORNERS = np.array(HEXAHEDRON.natural, dtype=float)
 
 def shape_functions(xi: Array) -> tuple[Array, Array]:
     """Shape functions [-], shape (..., 8), and their natural derivatives, shape (..., 8, 3), at xi, shape (..., 3)."""
-    factor = 1.0 + xi[..., None, :] * CORNERS
-    value = factor.prod(axis=-1) / 8.0
-    slope = np.empty((*xi.shape[:-1], 8, 3))
-    for axis in range(3):
-        others = [k for k in range(3) if k != axis]
-        slope[..., axis] = CORNERS[:, axis] * factor[..., others].prod(axis=-1) / 8.0
-    return value, slope
+    x, y, z = (1.0 + xi[..., axis, None] * CORNERS[:, axis] for axis in range(3))
+    slope = np.stack([CORNERS[:, 0] * (y * z), CORNERS[:, 1] * (x * z), CORNERS[:, 2] * (x * y)], axis=-1)
+    return x * y * z / 8.0, slope / 8.0
 
 
 SLOPE = shape_functions(CORNERS / np.sqrt(3.0))[1]  # at the Gauss points, shape (8 points, 8 corners, 3)

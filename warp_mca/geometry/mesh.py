@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Hashable, Iterable
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.geometry.boundary import boundary_faces
 from warp_mca.geometry.cell_types import stored_types
+from warp_mca.geometry.integrals import gauss_jacobians
 
 
 @dataclass(frozen=True)
@@ -76,6 +80,51 @@ class Mesh:
     @cached_property
     def _faces(self) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
         return boundary_faces(self.cells, len(self.points))
+
+    @property
+    def cell_volumes(self) -> Array:
+        """Volume of each cell [m^3], shape (cell_count,), float64; not to be written to."""
+        return self._integrals[1]
+
+    @property
+    def least_jacobians(self) -> Array:
+        """Least Jacobian determinant times weight at the Gauss points of each cell [m^3], shape (cell_count,)."""
+        return self._integrals[0]
+
+    @property
+    def _integrals(self) -> tuple[Array, Array]:
+        known = self.known
+        if "integrals" not in known:
+            parts = gauss_jacobians(self.points, self.cells)
+            found = np.concatenate([p.min(axis=1) for p in parts]), np.concatenate([p.sum(axis=1) for p in parts])
+            for values in found:
+                values.setflags(write=False)
+            known["integrals"] = found
+        return known["integrals"]
+
+    @property
+    def known(self) -> dict[Hashable, Any]:
+        """What was computed of its nodes and cells as they are: empty where one of them was changed since."""
+        state = tuple(hash(values.tobytes()) for values in (self.points, *self.cells.values()))
+        before, found = vars(self).get("_known", (None, {}))
+        if before != state:
+            vars(self)["_known"] = state, (found := {})
+        return found
+
+    def with_ratio(self, ratio: Array) -> Mesh:
+        """The mesh with another `volume_ratio`, and with what is known of it."""
+        made = replace(self, volume_ratio=ratio)
+        vars(made).update({name: vars(self)[name] for name in ("_faces", "_known") if name in vars(self)})
+        return made
+
+    def share_faces(self, others: Iterable[Mesh]) -> None:
+        """Take the boundary from one of the other meshes that has the same cells, in place of finding it again."""
+        for other in others:
+            own, its = self.cells, other.cells
+            alike = "_faces" in vars(other) and len(self.points) == len(other.points) and own.keys() == its.keys()
+            if alike and all(np.array_equal(cells, its[name]) for name, cells in own.items()):
+                vars(self)["_faces"] = other._faces
+                return
 
     def surface(self, name: str) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Boundary faces whose nodes all lie in the node set `name` ("boundary", unless there is one: all of them).

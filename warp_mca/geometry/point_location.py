@@ -17,6 +17,8 @@ from warp_mca.geometry.inertia_brick import corner_weights
 from warp_mca.geometry.mesh import Mesh
 
 CANDIDATES = 64  # candidate cells for each point: the centres of long thin cells are far away
+CONVERGED = 1e-12  # change of natural coordinates after which Newton's method ends
+FLAT = 1e-12  # determinant of a Jacobian over the product of its columns' lengths, up to which it has no inverse
 OUTSIDE = 0.05  # share of a cell's diagonal by which a point may lie outside: faces on curved surfaces are flat
 
 # For each point: nodes of its cell, shape (point_count, MAX_CORNERS), int32; shape functions there [-], of that shape;
@@ -52,32 +54,49 @@ def in_hexahedra(at: Array, points: Array, cells: Index, boxes: Boxes) -> Locate
         boxes: around the cells, from `cell_boxes`.
     """
     near = _nearest(at, points, cells, boxes)
-    x = points[cells[near]]  # (point, candidate, corner, axis)
+    lower, upper = boxes[0][:, near], boxes[1][:, near]  # (axis, point, candidate)
     # No point of an element is nearer than its box: few candidates remain.
-    gap = np.linalg.norm(at[:, None] - np.clip(at[:, None], x.min(axis=2), x.max(axis=2)), axis=2)
+    gap = np.linalg.norm(at.T[..., None] - np.clip(at.T[..., None], lower, upper), axis=0)
     apart, weight = np.full(near.shape, np.inf), np.zeros((*near.shape, HEXAHEDRON.corners))
-    round_off = 1e-12 * np.ptp(x)
+    round_off = 1e-12 * (upper.max() - lower.min())
     tried = gap <= gap.min(axis=1, keepdims=True) + round_off
     while tried.any():
-        weight[tried], apart[tried] = _weights(np.repeat(at, tried.sum(axis=1), axis=0), x[tried])
+        corners = points[cells[near[tried]]]
+        weight[tried], apart[tried] = _weights(np.repeat(at, tried.sum(axis=1), axis=0), corners)
         tried = np.isinf(apart) & (gap <= apart.min(axis=1, keepdims=True) + round_off)
     alike = apart <= apart.min(axis=1, keepdims=True) + round_off  # a point on a face: the first of its cells
     best, rows = np.where(alike, near, len(cells)).argmin(axis=1), np.arange(len(at))
-    allowed = OUTSIDE * np.linalg.norm(np.ptp(x[rows, best], axis=1), axis=1)
+    allowed = OUTSIDE * np.linalg.norm((upper - lower)[:, rows, best], axis=0)
     return cells[near[rows, best]], weight[rows, best], apart[rows, best], allowed
 
 
 def _weights(at: Array, x: Array) -> tuple[Array, Array]:
     """Shape functions at the place in a hexahedron nearest to a point, shape (count, 8), and its distance [m]."""
     xi = np.zeros_like(at)
+    value, slope = shape_functions(xi)
+    missing = at - (value[:, None] @ x)[:, 0]
     for _ in range(8):  # Newton's method on x(xi) = at, kept within the element
+        before = xi
+        xi = np.clip(xi + _solved((slope.transpose(0, 2, 1) @ x).transpose(0, 2, 1), missing), -1.0, 1.0)
         value, slope = shape_functions(xi)
-        J = np.einsum("cak,cai->cik", slope, x)
-        missing = at - np.einsum("ca,cai->ci", value, x)
-        # the Jacobian has no inverse where corners of a wedge or a pyramid coincide
-        xi = np.clip(xi + (np.linalg.pinv(J) @ missing[..., None])[..., 0], -1.0, 1.0)
-    value, _ = shape_functions(xi)
-    return value, np.linalg.norm(at - np.einsum("ca,cai->ci", value, x), axis=-1)
+        missing = at - (value[:, None] @ x)[:, 0]
+        if np.abs(xi - before).max(initial=0.0) <= CONVERGED:
+            break
+    return value, np.linalg.norm(missing, axis=-1)
+
+
+def _solved(J: Array, right: Array) -> Array:
+    """Least x with J x = right, each shape (count, 3); J, shape (count, 3, 3), may have no inverse.
+
+    It has none where corners of a wedge or a pyramid coincide.
+    """
+    flat = np.abs(np.linalg.det(J)) <= FLAT * np.linalg.norm(J, axis=1).prod(axis=1)
+    if not flat.any():
+        return np.linalg.solve(J, right[..., None])[..., 0].astype(np.float64, copy=False)
+    found = np.empty_like(right)
+    found[~flat] = np.linalg.solve(J[~flat], right[~flat, :, None])[..., 0]
+    found[flat] = (np.linalg.pinv(J[flat]) @ right[flat, :, None])[..., 0]
+    return found
 
 
 def in_tetrahedra(at: Array, points: Array, cells: Index, boxes: Boxes) -> Located:

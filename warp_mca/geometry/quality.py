@@ -7,11 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.base.chunks import CHUNK, chunks
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.geometry.cell_types import CELL_TYPES, linear_type
 from warp_mca.geometry.inertia_brick import CARRIERS
-from warp_mca.geometry.integrals import integrals_of
 from warp_mca.geometry.mesh import Mesh
 
 _KEEP_ONE = "keep one of them (gmsh's format 2.2 writes a cell once for each of its physical groups, 4.1 does not)"
@@ -44,23 +42,9 @@ def scaled_jacobian(mesh: Mesh) -> NDArray[np.float64]:
     return np.concatenate([part.min(axis=1, initial=1.0) for part in _corner_volumes(mesh)])
 
 
-def gauss_jacobians(mesh: Mesh) -> list[NDArray[np.float64]]:
-    """Jacobian determinants times weights [m^3] of the cells of each stored type, shape (cell_count, point_count).
-
-    Hexahedra have 2 x 2 x 2 Gauss points, tetrahedra one point, those of ten nodes four.
-    """
-    found = []
-    for name, nodes in mesh.cells.items():
-        integrals, corners = integrals_of(name)
-        cells = nodes[:, :corners]
-        parts = [integrals.determinants(mesh.points[cells[part]]) for part in chunks(len(cells), CHUNK)]
-        found.append(np.concatenate(parts) if parts else np.zeros((0, 1)))
-    return found
-
-
 def volumes(mesh: Mesh) -> NDArray[np.float64]:
-    """Volume of each cell [m^3], shape (cell_count,)."""
-    return np.concatenate([part.sum(axis=1) for part in gauss_jacobians(mesh)])
+    """Volume of each cell [m^3], shape (cell_count,); not to be written to."""
+    return mesh.cell_volumes
 
 
 def edge_lengths(mesh: Mesh) -> NDArray[np.float64]:
@@ -110,7 +94,7 @@ def check(mesh: Mesh, name: str) -> None:
             point, or the volume of a tetrahedron is not; or two cells lie on the same side of a face of both.
     """
     check_whole(mesh, name)
-    good = np.concatenate([part.min(axis=1) > 0.0 for part in gauss_jacobians(mesh)])
+    good = mesh.least_jacobians > 0.0
     bad = np.flatnonzero(~good)
     if len(bad):
         raise RequestError(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,7 +38,7 @@ def with_volumes(mesh: Mesh, volume: float | Mapping[str, float]) -> Mesh:
 def with_ratios(mesh: Mesh, ratio: Array) -> Mesh:
     """The mesh with `volume_ratio`, shape (cell_count,) or (1,), those of rounding set to 1 and equal ones joined."""
     ratio = np.where(np.abs(ratio - 1.0) < ROUNDING, 1.0, ratio)
-    return replace(mesh, volume_ratio=ratio[:1] if (ratio == ratio[0]).all() else ratio)
+    return mesh.with_ratio(ratio[:1] if (ratio == ratio[0]).all() else ratio)
 
 
 def of_cells(mesh: Mesh) -> Array:

@@ -16,7 +16,7 @@ from warp_mca.geometry.boxes import Boxes, cell_boxes
 from warp_mca.geometry.cell_types import MAX_CORNERS, linear_type
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.geometry.point_location import LOCATE
-from warp_mca.scene import Line, Path, Scene
+from warp_mca.scene import Path, Scene
 
 if TYPE_CHECKING:
     from warp_mca.system.model import Model
@@ -41,22 +41,16 @@ class Probes:
 
 
 Place = tuple[NDArray[np.int32], Array]  # corners of the cells around the probes of a line, and their weights
-Found = dict[tuple[int, Line, float], Place]  # by mesh, line and spacing
 
 
-def locate(scene: Scene, model: Model, meshes: Mapping[str, Mesh], found: Found | None = None) -> Probes:
-    """Find the elements that the scene's paths run through; see `Scene.stress_paths`.
-
-    Args:
-        scene, model, meshes: of one run.
-        found: places found before, for scenes that share meshes; those found here are added.
+def locate(scene: Scene, model: Model, meshes: Mapping[str, Mesh]) -> Probes:
+    """Find the elements that the scene's paths run through, once in each mesh; see `Scene.stress_paths`.
 
     Raises:
         RequestError: a probe lies outside its body.
     """
     position: dict[str, Array] = {}
     corner, weight = [np.zeros((0, MAX_CORNERS), np.int32)], [np.zeros((0, MAX_CORNERS))]
-    found = {} if found is None else found
     boxes: dict[str, dict[str, Boxes]] = {}
     for path in scene.stress_paths:
         along = []
@@ -67,13 +61,13 @@ def locate(scene: Scene, model: Model, meshes: Mapping[str, Mesh], found: Found 
                 remedy = f"a line of {line.length:g} m would have {count:.3g} probes; give a larger one"
                 raise bad_value(f"Path {path.name}.spacing", path.spacing, remedy)
             share = np.linspace(0.0, 1.0, int(np.ceil(line.length / path.spacing - 1e-9)) + 1)
-            key = (id(mesh), line, path.spacing)
-            if key not in found:
+            key, known = (line, path.spacing), mesh.known
+            if key not in known:
                 at = np.asarray(line.start) + share[:, None] * np.subtract(line.end, line.start)
                 if line.body not in boxes:
                     boxes[line.body] = {name: cell_boxes(mesh.points, cells) for name, cells in mesh.cells.items()}
-                found[key] = _elements_around(at, mesh, boxes[line.body], path, line.body)
-            nodes, weights = found[key]
+                known[key] = _elements_around(at, mesh, boxes[line.body], path, line.body)
+            nodes, weights = known[key]
             along.append(line.position + share * line.length)
             corner.append((nodes + model.node_start[line.body]).astype(np.int32))
             weight.append(weights)

@@ -15,8 +15,8 @@ from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.physics.elements import Element
 from warp_mca.system.time_step import StableStep
 
-BATCH = 256  # elements whose exact eigenvalues are found at a time
-MAX_EXACT = 100 * BATCH  # elements with exact eigenvalues: each 24 x 24 problem takes 50 us
+BATCH = 96  # elements whose exact eigenvalues are found at a time
+MAX_EXACT = 266 * BATCH  # elements with exact eigenvalues: each 24 x 24 problem takes 50 us
 # Largest (omega dt)^2 of a contact spring on its node, at USUAL_SCALE of the stable step: BOUNCE where the spring alone
 # holds the node, up to SUPPORT more where the element does; see docs/measurements/methods.md.
 BOUNCE, SUPPORT, USUAL_SCALE = 1.0, 1.0, 0.9

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
+from dataclasses import fields, is_dataclass
+from itertools import islice
 
 from warp_mca.base import validate
 from warp_mca.base.errors import RequestError, bad_value
+from warp_mca.base.kept import Kept
 from warp_mca.geometry.cell_types import CELL_TYPES
 from warp_mca.geometry.degenerate import among, cut_to
 from warp_mca.geometry.mesh import Mesh
@@ -17,6 +20,10 @@ from warp_mca.physics.elements import ELEMENTS, default_element
 from warp_mca.physics.elements.cells import with_carriers
 from warp_mca.scene import Body, Scene
 
+ALIKE = 8  # meshes made last, among which one is looked for that has the same cells
+_PACKAGE = Mesh.__module__.rpartition(".")[0]
+_KEPT: Kept[Mesh] = Kept(500_000)  # cells of meshes that recipes gave to runs of this process, 50 MB of memory
+
 
 def mesh(
     scene: Scene, made: dict[object, Mesh] | None = None, given: Mapping[str, Mesh] | None = None
@@ -25,7 +32,8 @@ def mesh(
 
     Args:
         scene: whose bodies to mesh.
-        made: meshes by recipe, for scenes that share some; those made here are added.
+        made: meshes by recipe, for scenes that share some; those made here are added. Callers who give it change no
+            mesh, so that recipes of the package are meshed once in a process.
         given: finished meshes by body, in place of the bodies' own geometry.
 
     Raises:
@@ -38,7 +46,7 @@ def mesh(
     if given is not None:
         validate.kind_of("meshes", given, Mapping, "give a Mesh for each body by its name, as mca.mesh makes them")
     meshes = {}
-    made = {} if made is None else made
+    keep, made = made is not None, {} if made is None else made
     for body in scene.bodies:
         if given is not None and body.name not in given:
             raise bad_value("meshes", list(given), f"give a mesh of body {body.name} too")
@@ -46,9 +54,16 @@ def mesh(
         if given is not None:
             validate.kind_of(f"meshes[{body.name!r}]", geometry, Mesh, "give a finished Mesh, as mca.mesh makes it")
         key = _key(geometry)
+        known = _KEPT.get(key) if keep and _plain(geometry) else None
+        if known is not None:
+            made.setdefault(key, known)
         if key not in made:
             made[key] = geometry if isinstance(geometry, Mesh) else _build(scene, body, geometry)
+            if _plain(geometry):
+                made[key].share_faces(islice(reversed(tuple(made.values())), 1, ALIKE))
             check(made[key], body.name)
+            if keep and _plain(geometry):
+                _KEPT.put(key, made[key], made[key].cell_count)
         meshes[body.name] = made[key]
     cut = _cut(scene, meshes)
     _check_elements(scene, cut)
@@ -111,7 +126,23 @@ def _of_refine(scene: Scene, body: Body, error: RequestError) -> RequestError:
     return error if str(error).startswith(f"{field[0]}{own!r}:") else bad_value("refine", scene.refine, str(error))
 
 
-def _key(geometry: object) -> object:
+def _plain(geometry: object) -> bool:
+    """Whether it is a recipe of the package whose mesh depends on its numbers alone, on no file and no other mesh."""
+    if not is_dataclass(geometry) or isinstance(geometry, Mesh) or hasattr(geometry, "path"):
+        return False
+    if not type(geometry).__module__.startswith(_PACKAGE):
+        return False
+    return all(_is_number(getattr(geometry, field.name)) for field in fields(geometry))
+
+
+def _is_number(value: object) -> bool:
+    """Whether it is a number, a name or None, a tuple of such, or a recipe that depends on such alone."""
+    if isinstance(value, tuple):
+        return all(map(_is_number, value))
+    return value is None or isinstance(value, int | float | str) or _plain(value)
+
+
+def _key(geometry: object) -> Hashable:
     """What equal recipes share; a mesh, and a recipe that cannot be hashed, is like itself alone."""
     try:
         hash(geometry)

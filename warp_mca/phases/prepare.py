@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.build import build_model
-from warp_mca.model.paths import Found, Probes, locate
+from warp_mca.model.paths import Probes, locate
 from warp_mca.model.sensors import NO_SENSORS, Sensors, locate_sensors
 from warp_mca.phases.arguments import Progress
 from warp_mca.phases.meshing import mesh
@@ -108,7 +108,6 @@ class Setup:
         sensors: its probes and sections.
         start: the hand-off.
         request: how it is run.
-        places: of paths that were found so far, see `locate`.
     """
 
     scene: Scene
@@ -117,7 +116,6 @@ class Setup:
     sensors: Sensors
     start: HandOff
     request: Request
-    places: Found = field(default_factory=dict)
 
     def ready(
         self,
@@ -146,7 +144,7 @@ class Setup:
             span = min(span, scene.t_end - time)
         groups = grouping(scene, span, settings.device, settings.multi_rate)
         model = build_model(scene, meshes, X, V, watched, chain=self.start.chain, start=time, grouping=groups)
-        probes = locate(scene, model, meshes, self.places)
+        probes = locate(scene, model, meshes)
         warnings = told_before(scene, meshes, model) if said else ()
         check_range(model, settings.precision)
         self.request.begun(scene, model, meshes)
@@ -225,32 +223,30 @@ def place(
     request: Request,
     *,
     by: Callable[..., HandOff] = hand_off,
-    found: Found | None = None,
     made: dict[object, Mesh] | None = None,
 ) -> Setup:
     """Mesh a scene, unless its `meshes` are given, and place its bodies `by` a hand-off.
 
-    `found` as in `locate`, `made` as in `mesh`.
+    `made` as in `mesh`.
 
     Raises:
         RequestError: the scene cannot be meshed, or does not swing as written.
     """
     request.tell("mesh", 0.0)
-    meshes = mesh(scene, made, meshes)
+    meshes = mesh(scene, {} if made is None else made, meshes)
     masses = nodal_masses(scene, meshes) if scene.rigid else {}
     request.clock.lap("mesh")
     request.tell("rigid", 0.0)
     start = by(scene, meshes, masses)
     request.clock.lap("rigid")
     own = {"scene": scene, "meshes": meshes, "masses": masses, "start": start, "request": request}
-    return Setup(**own, sensors=locate_sensors(scene, meshes), places={} if found is None else found)
+    return Setup(**own, sensors=locate_sensors(scene, meshes))
 
 
 def prepare(
     scene: Scene,
     meshes: Mapping[str, Mesh] | None,
     request: Request,
-    found: Found | None = None,
     made: dict[object, Mesh] | None = None,
 ) -> Prepared:
     """A scene at its first touch, or where its bodies start without a rigid phase; arguments as in `place`.
@@ -258,6 +254,6 @@ def prepare(
     Raises:
         RequestError: the scene cannot be built as written.
     """
-    setup = place(scene, meshes, request, found=found, made=made)
+    setup = place(scene, meshes, request, made=made)
     start = setup.start
     return setup.ready(start.positions, start.velocities, start.t_contact or 0.0)

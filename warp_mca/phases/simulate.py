@@ -7,7 +7,6 @@ from dataclasses import replace
 
 from warp_mca.base.errors import RequestError
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.model.paths import Found
 from warp_mca.phases.carry_out import Course, begin
 from warp_mca.phases.forecast import announce
 from warp_mca.phases.prepare import Prepared, Request, prepare
@@ -78,12 +77,11 @@ def simulate(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | Non
 def _prepare(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | None, request: Request) -> list[Prepared]:
     """Every scene at the start of its impact phase."""
     made: dict[object, Mesh] = {}
-    places: Found = {}
     ready = []
     for k, scene in enumerate(scenes):
         own = replace(request, tell=lambda stage, _, k=k: request.tell(stage, k / len(scenes)))
         try:
-            ready.append(prepare(scene, None if meshes is None else meshes[k], own, places, made))
+            ready.append(prepare(scene, None if meshes is None else meshes[k], own, made))
         except RequestError as error:
             if len(scenes) == 1:
                 raise

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from warp_mca.base.errors import bad_value
+from warp_mca.base.kept import Kept
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.rigid.chain import Array, Chain
@@ -15,7 +17,9 @@ from warp_mca.rigid.placement import Placement, link_placements
 from warp_mca.rigid.scene_chain import chain_from_scene, release
 from warp_mca.rigid.swing import Swing, swing
 from warp_mca.rigid.target import TargetPlane, target_plane, tip_gap
-from warp_mca.scene import Body, RigidPlane, Scene, Surface
+from warp_mca.scene import Body, RigidPhase, RigidPlane, Scene, Surface
+
+_KEPT: Kept[bytes] = Kept(4_000_000)  # bytes of swings of this process
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,7 +119,7 @@ def hand_off(
     chain = chain_from_scene(scene, meshes, nodal_masses)
     _check_bodies(scene, scene.rigid.target, chain)
     tip, plane = scene.rigid.tip, target_plane(scene, scene.rigid.target, meshes)
-    run = swing(chain, *release(scene.rigid), tip_gap(chain, tip, plane), scene.rigid.t_max, t_end=t_end)
+    run = _swung(chain, scene.rigid, plane, t_end)
     placed, touched = chain.moved_to(run.t_end), run.ended_by == "touch"
     placements = {body.name: _own_placement(body, run.t_end) for body in scene.bodies}
     placements |= link_placements(placed, run.theta, run.theta_dot)
@@ -138,6 +142,23 @@ def hand_off(
         chain=chain,
         swing=run,
     )
+
+
+def _swung(chain: Chain, rigid: RigidPhase, plane: TargetPlane, t_end: float | None) -> Swing:
+    """The swing of `hand_off`, computed once in a process for chains, releases and planes that are equal.
+
+    It is kept packed, so that each run has arrays of its own.
+    """
+    start = release(rigid)
+    try:
+        key = pickle.dumps((chain, start, rigid.tip, plane, rigid.t_max, t_end))
+    except Exception:  # loads from outside the package that cannot be packed
+        return swing(chain, *start, tip_gap(chain, rigid.tip, plane), rigid.t_max, t_end=t_end)
+    packed = _KEPT.get(key)
+    if packed is None:
+        packed = pickle.dumps(swing(chain, *start, tip_gap(chain, rigid.tip, plane), rigid.t_max, t_end=t_end))
+        _KEPT.put(key, packed, len(packed))
+    return pickle.loads(packed)
 
 
 def at_release(scene: Scene, meshes: Mapping[str, Mesh], nodal_masses: Mapping[str, Array]) -> HandOff:

@@ -128,6 +128,14 @@ def seen(model: Model, samples: list[Cells], u: Array, before: Array) -> Array:
     if np.isfinite(u).all():
         for item in samples:
             found[item.body] += item.share * item.energies(u, item)
+    return greater(found, before)
+
+
+def greater(found: Array, before: Array) -> Array:
+    """Energies of each body, of what was found now or before, shape (body_count, COLUMNS) or empty.
+
+    It is that with more strain energy.
+    """
     before = before if before.shape == found.shape else np.zeros_like(found)
     more = found[:, SPENT, None] > before[:, SPENT, None]  # not-a-number is not greater
     return np.where(more, found, before)

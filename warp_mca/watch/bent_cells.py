@@ -29,7 +29,8 @@ class Cells:
 
     Attributes:
         body: number of the body, in the order of `Model.element_start`.
-        energies: that finds what `RIGHT` and the following name, of displacements and this, shape (COLUMNS,).
+        energies: that finds what `RIGHT` and the following name, of displacements and this, shape (COLUMNS,), or
+            (scene_count, COLUMNS) with `ends`.
         conn: their nodes, shape (cell_count, corner_count), int32; where strains of neighbours count, those next to
             them follow.
         looked_at: how many of `conn` are looked at.
@@ -38,6 +39,7 @@ class Cells:
         share: cells of the body, material and type over those looked at [-].
         X: positions of all nodes [m], shape (node_count, 3), float64.
         prepare: that finds what displacements do not change of them.
+        ends: how many of `conn` are those of each scene and the ones before it, where scenes are looked at together.
     """
 
     body: int
@@ -50,6 +52,15 @@ class Cells:
     share: float
     X: Array
     prepare: Callable[[Cells], object]
+    ends: tuple[int, ...] = ()
+
+    def summed(self, *columns: Array) -> Array:
+        """Sums of values of cells, each shape (cell_count,) or empty for 0, filled up to the shape of `energies`."""
+        first, found = 0, np.zeros((max(1, len(self.ends)), COLUMNS))
+        for row, end in zip(found, self.ends or (len(self.conn),), strict=True):
+            row[: len(columns)] = [value[first:end].sum() for value in columns]
+            first = end
+        return found if self.ends else found[0]
 
     @property
     def E(self) -> float:

@@ -21,10 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.geometry.hexahedron import CORNERS
-from warp_mca.watch.bent_cells import COLUMNS, Array, Cells, deviator_square, turned_back
+from warp_mca.watch.bent_cells import Array, Cells, deviator_square, turned_back
 
 # What positions of the corners have of the three edges, and of bending in each pair of them, shape (6, 8).
 _SHAPES = np.stack([*CORNERS.T, *(CORNERS[:, (m + 1) % 3] * CORNERS[:, (m + 2) % 3] for m in range(3))]) / 8.0
+_NONE = np.zeros(0)
 _LITTLE = 1e-300  # against division by zero
 LEAST = 0.01  # of the energy of bending that sides change as they lean
 DEEP = 1.4  # of the strain at yield: from there on, the moment of hex8i is a tenth above that of the section
@@ -134,32 +135,29 @@ def full_hexahedra(u: Array, cells: Cells) -> Array:
     spent = common + bent
     right = common + V / 6.0 * _right(modes, G, cells.nu, bent / np.maximum(spent, _LITTLE))
     right -= _wasted(strain, p, bricks, cells.E, projected=False)
-    found = np.zeros(COLUMNS)
-    found[:3] = right.sum(), spent.sum(), bent.sum()
+    flowing, flow = _NONE, _NONE
     if cells.sigma_y > 0.0:
         mean, point = np.sqrt(2.0 / 3.0 * deviator_square(strain)), np.sqrt(2.0 / 3.0 * bent / (G * V))
         if 3.0 * G * (mean + 3.0 * point).max() > cells.sigma_y:  # right strains at the surface are no larger
             share, sheared = point**2 / np.maximum(mean**2 + point**2, _LITTLE), _sheared(modes, bricks) / 9.0
             outer = np.sqrt(_right(modes, G, 0.5, share) / (3.0 * G))  # flow keeps volumes
             flows = 3.0 * G * (mean + np.maximum(point, outer)) > cells.sigma_y
-            flowing = _flowing(mean, point**2, sheared)
-            found[3:5] = V[flows] @ flowing[flows], V[flows] @ _flow(mean, outer)[flows]
-    return found
+            flowing = V * np.where(flows, _flowing(mean, point**2, sheared), 0.0)
+            flow = V * np.where(flows, _flow(mean, outer), 0.0)
+    return cells.summed(right, spent, bent, flowing, flow)
 
 
 def walls(u: Array, cells: Cells) -> Array:
     """What `bent_cells` names of cells of `hex8w` and `hex8w3` that are looked at, shape (COLUMNS,)."""
-    return _found(*_strains(u, cells), cells)
+    return cells.summed(*_found(*_strains(u, cells), cells))
 
 
-def _found(bricks: Bricks, strain: Array, p: Array, cells: Cells) -> Array:
-    """The same of cells that bend right where their sides do not lean, without flow."""
+def _found(bricks: Bricks, strain: Array, p: Array, cells: Cells) -> list[Array]:
+    """Right, spent and bending energy of cells that bend right where their sides do not lean [J]."""
     bent = bricks.volume / 6.0 * _driven(_modes(p, bricks, cells.G), cells.G, cells.nu)
-    wasted = _wasted(strain, p, bricks, cells.E).sum()
-    spent = _common(strain, p, bricks, cells.K, cells.G).sum() + bent.sum()
-    found = np.zeros(COLUMNS)
-    found[:3] = spent - wasted, spent, bent.sum() + wasted
-    return found
+    wasted = _wasted(strain, p, bricks, cells.E)
+    spent = _common(strain, p, bricks, cells.K, cells.G) + bent
+    return [spent - wasted, spent, bent + wasted]
 
 
 def one_point_hexahedra(u: Array, cells: Cells) -> Array:
@@ -175,10 +173,10 @@ def one_point_hexahedra(u: Array, cells: Cells) -> Array:
         mean, outer = _equivalent(strain, modes, cells.G)
         flows = 3.0 * cells.G * mean > cells.sigma_y
         flowing = mean + outer**2 / np.maximum(3.0 * mean, _LITTLE)
-        found[3:5] = V[flows] @ flowing[flows], V[flows] @ _flow(mean, outer)[flows]
+        found += [V * np.where(flows, flowing, 0.0), V * np.where(flows, _flow(mean, outer), 0.0)]
         surface = 3.0 * cells.G * mean + np.sqrt(6.0 * cells.E * bent / V)
-        found[5] = (bent * np.clip(surface / cells.sigma_y - 1.0, 0.0, 1.0))[~flows].sum()
-    return found
+        found.append(np.where(flows, 0.0, bent * np.clip(surface / cells.sigma_y - 1.0, 0.0, 1.0)))
+    return cells.summed(*found)
 
 
 def enriched_hexahedra(u: Array, cells: Cells) -> Array:
@@ -189,8 +187,13 @@ def enriched_hexahedra(u: Array, cells: Cells) -> Array:
     if cells.sigma_y > 0.0:
         mean, outer = _equivalent(strain, _modes(p, bricks, cells.G), cells.G)
         flows = 3.0 * cells.G * (mean + outer) > DEEP * cells.sigma_y
-        found[3:5] = V[flows] @ np.maximum(mean, outer / np.sqrt(3.0))[flows], V[flows] @ _flow(mean, outer)[flows]
-    return found
+        flowing = np.maximum(mean, outer / np.sqrt(3.0))
+        found += [V * np.where(flows, flowing, 0.0), V * np.where(flows, _flow(mean, outer), 0.0)]
+    return cells.summed(*found)
+
+
+# Of cells of several scenes these give a row for each.
+JOINED = {full_hexahedra, walls, one_point_hexahedra, enriched_hexahedra}
 
 
 def _equivalent(strain: Array, modes: Modes, G: float) -> tuple[Array, Array]:

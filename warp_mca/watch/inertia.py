@@ -107,9 +107,9 @@ def inertias(body: Body, mesh: Mesh) -> tuple[Array, Array]:
             place, weight = _points(x, cells.element.cell)
             weight = weight * density[:, None]
             mass += weight.sum()
-            first += np.einsum("ep,epi->i", weight, place)
-            exact += np.einsum("ep,epi,epj->ij", weight, place, place)
-            lumped += np.einsum("en,eni,enj->ij", cells.element.lumped_masses(x, density), x, x)
+            first += weight.ravel() @ place.reshape(-1, 3)
+            exact += _square(place, weight)
+            lumped += _square(x, cells.element.lumped_masses(x, density))
     centred = np.outer(first, first) / mass
     plain = rho / of_cells(mesh) if body.exact_mass else rho
     own = plain * volumes(mesh)
@@ -171,8 +171,9 @@ def _motion(x: Array, v: Array, mass: Array) -> Motion:
     total = float(mass.sum())
     centre, velocity = mass @ x / total, mass @ v / total
     arms = x - centre
-    inertia = _inertia(np.einsum("n,ni,nj->ij", mass, arms, arms))
-    spin = mass @ np.cross(arms, v - velocity)
+    inertia = _inertia(_square(arms, mass))
+    moment = (arms * mass[:, None]).T @ (v - velocity)  # sum of m r_i v_j
+    spin = np.array([moment[1, 2] - moment[2, 1], moment[2, 0] - moment[0, 2], moment[0, 1] - moment[1, 0]])
     rate = np.linalg.lstsq(inertia, spin, rcond=None)[0].astype(np.float64)
     return Motion(centre, velocity, rate, total, inertia)
 
@@ -200,6 +201,11 @@ def _allowed(c: Finished, body: str, x: Array, motion: Motion) -> Motion:
     shift = free[:3] @ turned[(share > HELD).sum() :].T  # motions of the centre without rotation
     velocity = part[:3] - shift @ np.linalg.lstsq(shift, part[:3], rcond=None)[0] if shift.size else part[:3]
     return motion._replace(velocity=velocity, rate=part[3:] / size)
+
+
+def _square(x: Array, weight: Array) -> Array:
+    """Sum of weight x x^T over all points, shape (3, 3); x has shape (..., 3), weight (...)."""
+    return (x * weight[..., None]).reshape(-1, 3).T @ x.reshape(-1, 3)
 
 
 def _inertia(square: Array) -> Array:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from warp_mca.step.transfer import Transfer
 from warp_mca.watch.bending import LOOKS, samples_of, seen
 from warp_mca.watch.bent_cells import Array, Cells
+from warp_mca.watch.bent_scenes import Together
 
 if TYPE_CHECKING:
     from warp_mca.step.solver import Solver
@@ -83,6 +84,10 @@ class Looks:
         sources = {"u": self._skins, "speed_square": state.speed_square} | springs
         self._watch = Transfer(sources, solver.device)
 
+    @cached_property
+    def _together(self) -> Together:
+        return Together([(item.ledger.model, item.samples) for item in self.scenes])
+
     def row(self, interval: int, intervals: int) -> None:
         """Look at the bending of bodies, once in a while, where this output interval begins."""
         if self._shape and interval and interval % max(1, intervals // LOOKS) == 0:
@@ -126,8 +131,12 @@ class Looks:
     def _see_shape(self) -> None:
         while self._shape and self._shape.pending:
             _, shape = self._shape.receive()
-            for item in self.scenes:
-                item.ledger.kept.stiffened = item.bent(shape["u"])
+            if len(self.scenes) == 1:
+                self.scenes[0].ledger.kept.stiffened = self.scenes[0].bent(shape["u"])
+                continue
+            before = [item.ledger.kept.stiffened for item in self.scenes]
+            for item, found in zip(self.scenes, self._together.seen(shape["u"], before), strict=True):
+                item.ledger.kept.stiffened = found
 
     def _see_skins(self) -> None:
         while self._watch and self._watch.pending:
