@@ -99,6 +99,19 @@ def test_a_mesh_falls_on_a_plane_of_the_file(tmp_path):
     assert 1e-6 * result.F_n.sum() == pytest.approx(4.0, rel=0.01)
 
 
+def test_a_flexible_link_without_geoms_touches_the_floor_of_the_file(tmp_path):
+    """A bar of 0.1 m above the floor by 0.05 m, at 1 m/s."""
+    text = """<mujoco><option gravity="0 0 0"/><worldbody><geom name="floor" type="plane" size="0 0 1"/>
+      <body name="bar" pos="0 0 0.05"><joint name="drop" type="slide" axis="0 0 1"/>
+      <inertial pos="0 0 0.05" mass="1" diaginertia="1e-3 1e-3 1e-4"/></body></worldbody></mujoco>"""
+    box = mca.Box(size=(0.02, 0.02, 0.1), divisions=(1, 1, 5), origin=(-0.01, -0.01, 0.0))
+    steel = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
+    machine = robot(text, tmp_path, flexible={"bar": box}, material=steel, qvel={"drop": -1.0})
+    swing = machine.swing()
+    assert swing.touch is not None and (swing.touch.first, swing.touch.second) == ("bar", "floor")
+    assert swing.t_end == pytest.approx(0.05, abs=1e-6)
+
+
 def test_meshes_of_a_package_are_found_above_the_file(tmp_path):
     meshes, files = tmp_path / "cup_description" / "meshes", tmp_path / "cup_description" / "urdf"
     meshes.mkdir(parents=True)

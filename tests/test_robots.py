@@ -176,7 +176,16 @@ def test_skin_says_the_side_at_edges_and_corners():
             '<tendon><fixed name="t" limited="true" range="0 1"><joint joint="hinge" coef="1"/></fixed></tendon>',
             "tendon t: it has limited",
         ),
-        ('<tendon><spatial><site site="a"/><site site="b"/></spatial></tendon>', "spatial tendons"),
+        (
+            '<worldbody><site name="a"/><site name="b" pos="1 0 0"/></worldbody>'
+            '<tendon><spatial><site site="a"/><site site="b"/></spatial></tendon>',
+            "spatial tendons",
+        ),
+        (
+            '<worldbody><body><joint name="socket" type="ball" limited="true" range="0 0.5"/><geom size="0.1"/>'
+            "</body></worldbody>",
+            "joint socket is a ball with a range",
+        ),
         ('<actuator><muscle name="m" joint="hinge" lengthrange="0 1"/></actuator>', "activations"),
         ('<actuator><position name="m" joint="hinge" kp="1" timeconst="0.1"/></actuator>', "activations"),
     ],

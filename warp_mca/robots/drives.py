@@ -25,9 +25,9 @@ def refuse_at_hand_off(machine: Machine) -> None:
         RequestError: the machine has something of it.
     """
     model, names, mj = machine.model, machine.names, machine.mj
-    for flag in ("SPRING", "DAMPER", "CLAMPCTRL"):
+    for flag in ("SPRING", "DAMPER", "CLAMPCTRL", *(("EQUALITY", "CONSTRAINT") if model.neq else ())):
         if int(model.opt.disableflags) & int(getattr(mj.mjtDisableBit, f"mjDSBL_{flag}")):
-            remedy = "an impact has springs, dampers and clamps of controls; take this flag out of the file's option"
+            remedy = "an impact has springs, dampers, equalities and clamps of controls; take this flag out of the file"
             raise bad_value("Robot: flag", f"{flag.lower()} disabled", remedy)
     for k in range(model.njnt):
         dofs = slice(int(model.jnt_dofadr[k]), int(model.jnt_dofadr[k]) + machine.rates_of(k))

@@ -64,7 +64,7 @@ class RobotSwing:
         ctrl: controls that are held then, shape (nu,), float64.
         momentum: generalised momenta M qvel then [kg m/s, kg m^2/s], shape (nv,), float64.
         kinetic_energy: then [J].
-        drives: force of each actuator on its joint then [N m, N], shape (nu,), float64.
+        drives: force of each actuator on its joint or tendon then [N m, N], shape (nu,), float64.
         energy_drift: largest error of the energy balance over the largest kinetic energy [-].
         closest: the smallest gap on the way [m], its time [s]; (inf, t_end) if none was watched.
         t: times of the sampled trajectory [s], shape (sample_count,), float64.

@@ -142,7 +142,8 @@ def pairs_of(mj: Any, robot: Robot, machine: Machine, skins: dict[str, Skin], ge
     """The pairs of surfaces that may touch.
 
     Pairs of geoms are those that the file lets collide (contype, conaffinity, exclude, no parent and child); a flexible
-    link has its skin in place of its geoms. What stands beside the machine may touch each of these surfaces.
+    link has its skin in place of its geoms, with bits of 1 where it has none. What stands beside the machine may touch
+    each of these surfaces.
 
     Args:
         mj: the module.
@@ -180,7 +181,7 @@ def _own_sides(robot: Robot, machine: Machine, skins: dict[str, Skin]) -> Iterat
     for k in range(model.nbody):
         own = np.flatnonzero(model.geom_bodyid == k)
         if names.body(k) in robot.flexible:
-            bit = np.bitwise_or.reduce(bits[own], axis=0) if len(own) else np.zeros(2, dtype=int)
+            bit = np.bitwise_or.reduce(bits[own], axis=0) if len(own) else np.ones(2, dtype=int)
             yield Side(name=names.body(k), link=k, skin=skins[names.body(k)]), bit
             continue
         for geom in own:
