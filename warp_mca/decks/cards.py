@@ -104,7 +104,7 @@ class Content:
             elif kind:
                 self.found[kind].append(item)
         if unknown:
-            raise ValueError(f"{_listed(unknown)} not read; write the deck without, or name them in leave_out")
+            raise ValueError(f"{_listed(unknown)} not read; write the deck without, or name them in leave_out (--leave-out)")
         if own:
             self.notes.append(f"{path}: {_listed(own)} left to the elements of this program")
         if left:
