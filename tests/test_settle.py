@@ -275,7 +275,7 @@ def test_a_body_settles_on_a_spring_from_one_that_waits(rigid: bool, rho: float)
 
 def test_what_moves_slowly_rests_as_soon_as_its_period_lets_it():
     """A weight on a soft spring beside a stiff block that has most of the energy: the damping of that would hold it."""
-    weight = mca.Body(name="weight", rigid=True, mass=1e-6, inertia=(1e-12,) * 3, position=(0.1, 0.0, 0.0))
+    weight = mca.Body(name="weight", rigid=True, mass=1e-6, inertia=(1e-12, 1e-12, 1e-12), position=(0.1, 0.0, 0.0))
     k, mass = 2.4, 1e-6
     soft = mca.Spring(name="soft", body="weight", at=(0.0, 0.0, 0.0), other_at=(0.1, 0.05, 0.0), stiffness=k)
     made = scene(bodies=(block(), weight), contacts=(on_plane("block"),), loads=(soft,))
