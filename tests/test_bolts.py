@@ -194,6 +194,23 @@ def test_a_batch_gives_each_scene_its_bolts():
             np.testing.assert_allclose(result[name], alone[name], rtol=5e-3, atol=5e-3 * np.abs(alone[name]).max())
 
 
+def test_parts_that_fall_do_not_sink_while_their_bolts_are_tightened():
+    """With general contact as well; ten thousand times heavier than on Earth, they would be on the floor."""
+    falling = tuple(replace(body, velocity=(0.0, 0.0, -2.0)) for body in (PLATE, LID))
+    floor = mca.RigidPlane(point=(0.0, 0.0, -4.02e-3), normal=(0.0, 0.0, 1.0))
+    hit = mca.Contact(name="floor", slave=mca.Surface(body="base", nodes="zmin"), master=floor)
+    made = clamped(
+        bodies=falling,
+        contacts=(mca.ContactAll(mu=0.2), hit),
+        gravity=(0.0, 0.0, -9.81e4),
+        phases=(mca.Settle(falling=True, tolerance=1e-3),),
+        impact=mca.ImpactPhase(duration=1e-6, output_interval=1e-6),
+    )
+    result = mca.run(made, device="cpu")
+    assert result.contacts[-1].pressure[result.time <= 0.0].max() == 0.0
+    assert result["bolt_screw_N"][-1] == pytest.approx(SCREW.preload, rel=5e-3)
+
+
 REFUSED = [
     ({"other_at": (0.0, 0.0, -L)}, "its ends lie in one place"),
     ({"diameter": 0.0}, "Bolt bolt1.diameter"),

@@ -187,9 +187,11 @@ def test_the_deck_runs_as_the_scene(tmp_path: Path, capsys: pytest.CaptureFixtur
     """By the command, and in Python, the same force."""
     from warp_mca.cli.main import main
 
-    (tmp_path / "it.k").write_text(deck("columns"))
-    out = tmp_path / "out"
-    assert main(["run", str(tmp_path / "it.k"), "--units", "t-mm-s", "--out", str(out)]) == 0
+    (tmp_path / "it.k").write_text(deck("columns", "*DAMPING_GLOBAL\n0,1.\n"))
+    out, words = tmp_path / "out", ["run", str(tmp_path / "it.k"), "--units", "t-mm-s"]
+    assert main(words) == 2
+    assert "name them in leave_out (--leave-out)" in capsys.readouterr().err
+    assert main([*words, "--leave-out", "DAMPING_*", "--out", str(out)]) == 0
     wanted = mca.run(by_hand(), device="cpu")
     assert wanted.F_n.max() > 100.0
     np.testing.assert_array_equal(mca.load(out).F_n, wanted.F_n)
@@ -205,6 +207,8 @@ def test_units_belong_to_decks(tmp_path: Path, capsys: pytest.CaptureFixture[str
             "--units = 'SI': it gives those of a keyword deck (.k, .key, .dyn); leave it out",
         ),
         ([str(tmp_path / "it.k"), "--units", "SI", "--set", "mu=0.1"], "--set = 'mu': a deck has no parameters"),
+        (["two_link", "--leave-out", "HOURGLASS"], "--leave-out = 'HOURGLASS': it is for decks that run with --units"),
+        ([str(tmp_path / "it.k"), "--leave-out", "HOURGLASS"], "it is for decks that run with --units"),
     ):
         assert main(["run", *words]) == 2
         assert error in capsys.readouterr().err

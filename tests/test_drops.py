@@ -114,20 +114,24 @@ def test_what_no_drop_can_mean_is_refused(number: int):
 
 
 def test_from_a_step_file_to_a_verdict_over_poses(tmp_path: Path):
-    """In less than 25 lines: glued, tied and loose parts, two of them instances of one."""
+    """In less than 25 lines: glued, tied, screwed and loose parts, two of them instances of one."""
     phone = mca.Assembly(
         write_phone(tmp_path),
         size=8e-3,
-        materials={"*": STEEL, "shell": mca.library.ABS},
+        materials={"*": mca.library.POLYCARBONATE, "shell": mca.library.ABS},
         join={("board", "chip*"): "glue", ("shell", "glass"): "tie"},
     )
+    ends: dict[str, Any] = {"at": (7.5e-3, 5e-3, 3e-3), "other_at": (7.5e-3, 5e-3, 0.0), "reach": 6e-3}
+    board = "board+chip+chip_2"
+    screw = mca.Bolt(name="screw", body=board, other="shell", **ends, diameter=1.6e-3, preload=50.0)
     scenes = [
         mca.drop_test(
             phone,
             height=HEIGHT,
             pose=pose,
-            impact=mca.ImpactPhase(duration=3e-6, output_interval=0.5e-6),
-            criteria=("max_von_mises(shell) < 20e6",),
+            loads=(screw,),
+            impact=mca.ImpactPhase(duration=4e-6, output_interval=0.5e-6),
+            criteria=("max_von_mises(shell) < 20e6", "max_shear(screw) < 1e3"),
         )
         for pose in ("face", "corner")
     ]
@@ -140,7 +144,8 @@ def test_from_a_step_file_to_a_verdict_over_poses(tmp_path: Path):
     assert worst["shell.max_von_mises"]["value"] == max(shell)
     assert worst["shell.max_von_mises"]["parameters"] == {"pose": rows[int(np.argmax(shell))]["pose"]}
     assert worst["F_n_max"]["value"] == max(row["F_n_max"] for row in rows) > 0.0
-    assert {name.split(".")[0] for name in worst} >= {"shell", "board+chip+chip_2", "F_n_max"}
+    assert {name.split(".")[0] for name in worst} >= {"shell", board, "F_n_max"}
+    assert min(row["bolts.screw.max_force.value"] for row in rows) > 49.9
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ import pytest
 import warp_mca as mca
 from warp_mca.cli.main import main
 from warp_mca.kernels.materials.laws import law_functions
-from warp_mca.phases.settle import HalfSteps
+from warp_mca.phases.half_steps import HalfSteps
 from warp_mca.registration import TABLES
 from warp_mca.scene.contact_laws import Penalty
 from warp_mca.scene.joints import Joint

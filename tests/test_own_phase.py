@@ -13,8 +13,8 @@ from test_recording import Memory
 from test_settle import GAP, SPEED, WEIGHT, scene
 
 import warp_mca as mca
+from warp_mca.phases.half_steps import HalfSteps
 from warp_mca.phases.impact import Impact
-from warp_mca.phases.settle import HalfSteps
 from warp_mca.phases.stretch import Stretch, stretch_ended
 from warp_mca.scene import model_file
 

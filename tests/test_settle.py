@@ -273,6 +273,17 @@ def test_a_body_settles_on_a_spring_from_one_that_waits(rigid: bool, rho: float)
     assert waits.summary["energy_error"] < 1e-3
 
 
+def test_what_moves_slowly_rests_as_soon_as_its_period_lets_it():
+    """A weight on a soft spring beside a stiff block that has most of the energy: the damping of that would hold it."""
+    weight = mca.Body(name="weight", rigid=True, mass=1e-6, inertia=(1e-12, 1e-12, 1e-12), position=(0.1, 0.0, 0.0))
+    k, mass = 2.4, 1e-6
+    soft = mca.Spring(name="soft", body="weight", at=(0.0, 0.0, 0.0), other_at=(0.1, 0.05, 0.0), stiffness=k)
+    made = scene(bodies=(block(), weight), contacts=(on_plane("block"),), loads=(soft,))
+    made = replace(made, impact=mca.ImpactPhase(duration=2e-5), phases=(mca.Settle(duration=0.04),))
+    result = mca.run(made, threads=1)
+    assert result["spring_soft_m"][-1] == pytest.approx(mass * G / k, rel=2e-3)
+
+
 @pytest.mark.parametrize("damping", [{"loss_factor": 0.2, "band": (100.0, 1e4)}, {"stiffness": 1e-7}, {"mass": 2e4}])
 def test_what_damping_takes_of_a_heated_body_is_right_though_velocities_change(damping: dict[str, Any]):
     heat = mca.ThermalStrain(body="block", expansion=1e-5, temperature=100.0)

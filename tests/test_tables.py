@@ -14,6 +14,7 @@ from test_probes import PROBES, SECTIONS, watched
 
 import warp_mca as mca
 from warp_mca.results import tables
+from warp_mca.results.headlines import headlines
 from warp_mca.results.probe_figure import plot_probes
 from warp_mca.results.units import unit_of
 
@@ -101,6 +102,12 @@ def test_what_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch):
     for call, package in ((result().to_pandas, "pandas"), (result().to_xarray, "xarray")):
         with pytest.raises(mca.RequestError, match=rf"needs the package {package}: pip install 'warp_mca\[data\]'"):
             call()
+
+
+def test_a_force_that_rises_to_the_end_of_a_run_is_told_beside_peaks_that_are_none():
+    summary = {**result().summary, "F_n_peaks": [], "F_n_max": 5760.0}
+    assert dict(headlines(summary))["F_n peaks"] == "none yet, 5.760 kN at most so far"
+    assert dict(headlines({**summary, "F_n_max": 0.0}))["F_n peaks"] == "none"
 
 
 def test_a_result_shows_itself_in_a_line_and_in_notebooks():

@@ -250,6 +250,8 @@ def _add_scene(parser: argparse.ArgumentParser, more: str = "") -> None:
     group.add_argument(
         "--units", metavar="SYSTEM", help="run an LS-DYNA deck, in SI, t-mm-s, kg-mm-ms, g-mm-ms or g-cm-us"
     )
+    help_text = "a keyword that the deck is read without, as DAMPING_GLOBAL or 'DAMPING_*'; once for each"
+    group.add_argument("--leave-out", action="append", default=[], metavar="KEYWORD", help=help_text)
     help_text = "change a parameter; once for each"
     _add_element(group, choices=None)  # `--import` may bring more
     _add_import(group)

@@ -51,6 +51,8 @@ def read_requests(args: argparse.Namespace, settings: Sequence[Mapping[str, str]
     if robot_script.is_robot(args.scene):
         raise robot_script.no_scene(args.scene)
     units, drop = getattr(args, "units", None), part_script.is_drop(args)
+    if units is None and (left := getattr(args, "leave_out", ())):
+        raise bad_value("--leave-out", left[0], "it is for decks that run with --units; give that, or leave it out")
     if drop:
         part_script.check_drop(args)
     elif part_script.is_part(args.scene) and units is None:
@@ -94,7 +96,7 @@ def _of_deck(args: argparse.Namespace, units: str, more: Mapping[str, str]) -> R
     if overrides := _overrides(args, more):
         remedy = "a deck has no parameters; change the deck, or make a scene of it by mca.read_deck"
         raise bad_value("--set", next(iter(overrides)), remedy)
-    scene = _with(read_deck(args.scene, units), args, getattr(args, SCALE, None))
+    scene = _with(read_deck(args.scene, units, args.leave_out), args, getattr(args, SCALE, None))
     return Request(scene, Path(args.scene).stem)
 
 

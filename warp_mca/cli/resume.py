@@ -26,6 +26,7 @@ from warp_mca.scene.model_file import SUFFIX as MODEL
 OPTIONS: dict[str, tuple[type, ...]] = {
     "preset": (str,),
     "units": (str,),
+    "leave_out": (list,),
     "refine": (float,),
     "element": (str,),
     "set": (list,),

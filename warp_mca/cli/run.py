@@ -42,7 +42,8 @@ def run(args: argparse.Namespace) -> None:
     if robot_script.is_robot(args.scene):
         robot_script.print_script(args.scene)
         return
-    if part_script.is_part(args.scene) and args.units is None and not part_script.is_drop(args):
+    runs = args.units is not None or args.leave_out or part_script.is_drop(args)
+    if part_script.is_part(args.scene) and not runs:
         part_script.print_script(args.scene)
         return
     if not args.quiet:

@@ -104,7 +104,8 @@ class Content:
             elif kind:
                 self.found[kind].append(item)
         if unknown:
-            raise ValueError(f"{_listed(unknown)} not read; write the deck without, or name them in leave_out")
+            remedy = "write the deck without, or name them in leave_out (--leave-out)"
+            raise ValueError(f"{_listed(unknown)} not read; {remedy}")
         if own:
             self.notes.append(f"{path}: {_listed(own)} left to the elements of this program")
         if left:

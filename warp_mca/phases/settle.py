@@ -2,9 +2,10 @@
 
 Bodies swing about their equilibrium. Their kinetic energy has its first maximum after a quarter of the period,
 t = pi / (2 w), where they pass it (Cundall, Explicit finite-difference methods in geomechanics, 1976): there velocities
-become zero. From then on all velocities shrink by exp(-2 w t), which is critical damping of that motion. The ledger
-books what they lose as damping. Velocities are held at half steps: v(n) is the mean of v(n-1/2) and v(n+1/2), and one
-step of a copy of the state tells how far they are apart.
+become zero. From then on all velocities shrink by exp(-2 w t), which is critical damping of a motion of frequency w. It
+follows the motion that is left, see `HalfSteps.look`: with the first w slow motions would only creep. w is at most the
+first one, and at least that of which a quarter of the period has passed since the start, so that bodies that nothing
+holds come to rest, too. The ledger books what is lost as damping.
 """
 
 from __future__ import annotations
@@ -14,27 +15,22 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import GuardError, bad_value
 from warp_mca.phases.division import MAX_STEPS, coarser
+from warp_mca.phases.half_steps import HalfSteps
 from warp_mca.phases.stretch import Stretch, stretch_ended
-from warp_mca.physics.contact.edge_stage import EdgeStage
-from warp_mca.scene import DampedPenalty, Settle
+from warp_mca.scene import Settle
 
 if TYPE_CHECKING:
     from warp_mca.phases.impact import Impact
-    from warp_mca.phases.scene_run import SceneRun
-    from warp_mca.step.solver import Solver
-    from warp_mca.system.state import State
 
 Array = NDArray[np.float64]
-STEPS = 10  # between two looks at the kinetic energy at most
-LOOKS = 8  # at least until it is at its greatest
+STEPS = 10  # between two looks at the kinetic energy at most, until it was at its greatest
+LOOKS = 8  # at least until then, and in each quarter of the period of what moves later
+LENGTHS = (1, 2, 5, STEPS)  # of what is advanced at once: a graph of launches is captured for each other number
 ROWS = 500  # of the history, where it lasts as long as it may
-ALL_AXES = 7  # at rest, in the role of a node
-HEAVY = 1e60  # mass [kg] and inertia [kg m^2] of rigid bodies that nothing moves
 
 
 def settle(phase: Settle, impact: Impact, tell: Callable[[float], None]) -> Stretch:
@@ -57,16 +53,20 @@ def settle(phase: Settle, impact: Impact, tell: Callable[[float], None]) -> Stre
     motion.slow(0.0)
     motion.fall()
     greatest = kinetic = 0.0
-    quiet = reached = 0
+    quiet = reached = quarter = 0  # steps, the last one of a quarter of the period of what moves
     passed = False
-    while quiet <= reached or state.steps * fine.dt < motion.rise:
+    while quiet <= max(reached, quarter) or state.steps * fine.dt < motion.rise:
         if state.steps >= steps.count - STEPS:
             raise GuardError(
                 f"bodies do not rest after Settle.duration = {phase.duration:g} s: their kinetic energy is still "
                 f"{kinetic / greatest:.2g} of its greatest value; give a longer duration, or hold what falls"
             )
-        stride = max(1, min(STEPS, state.steps // LOOKS))
-        impact.advance(until=state.steps + stride)
+        wanted = max(1, min(STEPS, state.steps // LOOKS), quarter // LOOKS)
+        wanted = min(wanted, steps.count - STEPS - state.steps)
+        length = max(length for length in LENGTHS if length <= wanted)
+        stride = wanted - wanted % length
+        for _ in range(stride // length):
+            impact.advance(until=state.steps + length)
         tell(state.steps / steps.count)
         kinetic = motion.look()
         if kinetic > greatest:
@@ -74,205 +74,11 @@ def settle(phase: Settle, impact: Impact, tell: Callable[[float], None]) -> Stre
         quiet = 0 if kinetic > phase.tolerance * greatest else quiet + stride
         rising, passed = not passed and kinetic == greatest, passed or kinetic < greatest
         later = state.steps > reached + stride
-        motion.slow(1.0 if rising else math.exp(-math.pi * stride / reached) if later else 0.0)
+        risen = state.steps * fine.dt > motion.rise
+        quarter = round(min(max(motion.quarter / fine.dt if risen else 0.0, reached), state.steps))
+        motion.quarter = quarter * fine.dt
+        motion.slow(1.0 if rising else math.exp(-math.pi * stride / quarter) if later else 0.0)
     motion.rest(fine.per_interval - 1)
     stretch = stretch_ended(impact, "settle", "rest", fine)
     motion.release(impact.scene_runs[0])
     return stretch
-
-
-class Held:
-    """Bodies that nothing accelerates until they are released: other bodies settle on what hangs from them, too."""
-
-    def __init__(self, solver: Solver, nodes: NDArray[np.bool_], bodies: NDArray[np.bool_]) -> None:
-        """Hold nodes of flexible bodies, and rigid bodies."""
-        role, self.before = solver.constraints.role, []
-        if nodes.any() and len(role):
-            self._put(role, np.where(nodes, role.numpy() | ALL_AXES, role.numpy()))
-        if bodies.any():
-            own, held = solver.rigid.bodies, bodies[:, None, None]
-            self._put(own.mass, np.where(bodies, HEAVY, own.mass.numpy()))
-            self._put(own.inertia, np.where(held, HEAVY * np.eye(3), own.inertia.numpy()))
-            self._put(own.inverse_inertia, np.where(held, np.eye(3) / HEAVY, own.inverse_inertia.numpy()))
-            self._put(own.gravity, np.where(bodies[:, None], 0.0, own.gravity.numpy()))
-
-    def _put(self, array: wp.array, values: NDArray) -> None:
-        self.before.append((array, array.numpy().copy()))
-        array.assign(values)
-
-    def release(self) -> None:
-        """Let all move as before."""
-        for array, values in self.before:
-            array.assign(values)
-
-
-class HalfSteps:
-    """Velocities of nodes and momenta of rigid bodies at half steps, and how a state gets others.
-
-    A phase calls `slow(0.0)` at its start, `look` and `slow` after some steps, `rest` at its end, and `release` after
-    `stretch_ended`.
-    """
-
-    def __init__(self, impact: Impact, falling: bool = False) -> None:
-        """Bodies that have a velocity now, at the start, wait from now on; with `falling` until `fall` is called."""
-        self.impact, self.solver, self.state = impact, impact.solver, impact.state
-        model = self.solver.model
-        self.kept = impact.scene_runs[0].ledger.kept
-        self.trial = self.state.copy()
-        waiting = np.zeros(model.node_count, dtype=bool)
-        ends = [*sorted(model.node_start.values())[1:], model.node_count]
-        for first, end in zip(sorted(model.node_start.values()), ends, strict=True):
-            waiting[first:end] = model.V[first:end].any()
-        bodies = np.array([waiting[body.own[0]] for body in model.rigid_bodies], dtype=bool)
-        self.waiting = self.moving = [waiting, bodies, bodies]
-        self.falling, self.clock = falling, self.state.steps
-        self.rise = self._tighten(True)
-        self.now = before, after = self._half_steps()
-        self.initial = [0.5 * (a + b) for a, b in zip(before, after, strict=True)]
-        rigid = self.state.rigid
-        self.places = [(self.state.u, waiting), (rigid.centre, bodies), (rigid.rotation, bodies)]
-        self.start = [np.array(array.numpy()) for array, _ in self.places]
-        # dashpots of contacts wait: changes of velocity between steps would be lost from what they book
-        damped = [item for item in self.solver.contacts if item.laws.normal == DampedPenalty.law]
-        self.dashpots = [(item.parameters, np.array(item.parameters.numpy())) for item in damped]
-        for parameters, _ in self.dashpots:
-            parameters.zero_()
-        self.held = Held(self.solver, waiting & (not falling), bodies & (not falling))
-        self.now = self._half_steps()
-
-    def fall(self) -> None:
-        """Let bodies settle that fall, which have lost their velocity by now; it is theirs again in `release`."""
-        if self.falling:
-            self.waiting, self.places = [np.zeros_like(mask) for mask in self.moving], []
-
-    def _tighten(self, on: bool) -> float:
-        """Let bolts be tightened, or no more; the time that this takes [s]."""
-        return max((getattr(self.solver, kind).tighten(on) for kind in self.solver.model.loads), default=0.0)
-
-    def look(self) -> float:
-        """Kinetic energy of the bodies that settle, the mean of those half a step before and after [J].
-
-        That of records, v(n-1/2) . M v(n+1/2) / 2, is below 0 where bodies turn back.
-
-        Raises:
-            GuardError: a guard has stopped the phase.
-        """
-        if self.impact.stopped[0] is not None:
-            raise GuardError(f"before the impact: {self.impact.stopped[0]}")
-        self.now = self._half_steps()
-        (before, *_), (after, *_) = self.now
-        settling = ~self.waiting[0]
-        return 0.5 * (self._kinetic(before, before, settling) + self._kinetic(after, after, settling))
-
-    def slow(self, factor: float) -> None:
-        """Let bodies that wait be where they were without velocity, and the others keep a factor of theirs."""
-        wanted, fallen = [], self._fallen()
-        for before, after, waiting, gained in zip(*self.now, self.waiting, fallen, strict=True):
-            wanted.append(np.where(waiting[:, None], 0.0, factor * (0.5 * (before + after) - gained)))
-        self._give(wanted, factor != 1.0 or any(gained.any() for gained in fallen))
-        for (array, mask), start in zip(self.places, self.start, strict=False):
-            if mask.any():
-                array.assign(np.where(mask[:, None], start, array.numpy()))
-
-    def _fallen(self) -> list[Array]:
-        """What gravity has given to velocities and momenta since the last call, where bodies settle without weight.
-
-        Between two calls, a few steps apart, it moves nothing by more than a picometre or so.
-        """
-        model, time = self.solver.model, (self.state.steps - self.clock) * self.impact.steps.dt
-        self.clock = self.state.steps
-        found = [np.zeros_like(array) for array in self.now[0]]
-        if self.falling:
-            role = self.solver.constraints.role
-            free = role.numpy() == 0 if len(role) else slice(None)
-            found[0][free] = time * model.gravity[0]
-            if len(found[1]):
-                found[1][:] = time * np.outer(self.solver.rigid.bodies.mass.numpy(), model.gravity[0])
-        return found
-
-    def rest(self, steps: int) -> None:
-        """So many steps in which contact forces are summed, as before any row: the first one of the impact has them."""
-        for contact in self.state.contacts:
-            for array in (contact.spring.impulse, contact.spring.normal_impulse, contact.spring.stick_impulse):
-                array.zero_()
-        self.solver.search(self.state)
-        self.solver.step(self.state, steps)
-        self.look()
-        self.slow(0.0)
-
-    def release(self, scene_run: SceneRun) -> None:
-        """Let bodies that waited have their velocities, in a state whose rows begin anew."""
-        for parameters, values in self.dashpots:
-            parameters.assign(values)
-        self.held.release()
-        self._tighten(False)
-        self.waiting = self.moving
-        kept, state = scene_run.ledger.kept, self.state
-        self.look()
-        (before, *_), (after, *_) = self.now
-        at_rest = self._kinetic(before, after, ~self.waiting[0])
-        self._give(self.initial, False)
-        v = np.array(state.v.numpy(), dtype=np.float64)
-        given = self._kinetic(v, 2.0 * self.initial[0] - v, self.waiting[0])
-        kept.initial_energy += given
-        kept.initial_kinetic = at_rest + given
-        state.normal_force.zero_()
-        squares = (self.solver.model.V**2).sum(axis=1)
-        state.speed_square.assign(squares if len(state.speed_square) > 1 else squares.max(keepdims=True))
-
-    def _half_steps(self) -> tuple[list[Array], list[Array]]:
-        """Velocities and momenta half a step before and after the present time."""
-        self.trial.assign(self.state)
-        before = [np.array(array.numpy(), dtype=np.float64) for array in self._arrays(self.state)]
-        with wp.ScopedDevice(self.solver.device):
-            self.solver.step(self.trial, 1)
-        return before, [np.array(array.numpy(), dtype=np.float64) for array in self._arrays(self.trial)]
-
-    def _give(self, wanted: list[Array], everything: bool) -> None:
-        """Give velocities at the present time to bodies that wait, or to all, and book what the others lose."""
-        before, after = self.now
-        half = [0.5 * (b - a) for a, b in zip(before, after, strict=True)]
-        masks = [np.ones_like(mask) if everything else mask for mask in self.waiting]
-        given = [
-            np.where(mask[:, None], value - kick, old)
-            for mask, value, kick, old in zip(masks, wanted, half, before, strict=True)
-        ]
-        for array, values in zip(self._arrays(self.state), given, strict=True):
-            if len(array):
-                array.assign(values)
-        changed = masks[0] & ~self.waiting[0]
-        lost = self._kinetic(before[0], after[0], changed)
-        self.kept.damping += lost - self._kinetic(given[0], given[0] + 2.0 * half[0], changed)
-        way = self.impact.steps.dt * (before[0] - given[0])
-        self.kept.damping += self._unfelt(way)
-        for kind in self.solver.model.loads if self.state.steps else ():  # no step has moved anything before
-            getattr(self.solver, kind).feel(self.state, self.trial, way)
-
-    def _unfelt(self, way: Array) -> float:
-        """Work of friction over the way that a change of velocity hides from springs along surfaces [J].
-
-        They add up velocities times steps, and nodes moved by those before the change. `way`: [m], (node_count, 3).
-        """
-        work = 0.0
-        for stage, own in zip(self.solver.contacts, self.state.contacts, strict=True):
-            tangential = np.array(own.spring.tangential.numpy(), dtype=np.float64)
-            if not len(tangential) or isinstance(stage, EdgeStage):
-                continue
-            face = np.array(own.spring.face.numpy(), dtype=np.int32)
-            pressed = np.flatnonzero(face >= 0)
-            moved = way[np.array(stage.slave.numpy(), dtype=np.int32)[pressed // stage.sides]]
-            if not stage.on_plane:
-                corners = np.array(stage.face.numpy(), dtype=np.int32)[face[pressed]]
-                weight = np.array(own.spring.weight.numpy(), dtype=np.float64)
-                moved = moved - np.einsum("sk,ski->si", weight[pressed], way[corners])
-            work -= float((tangential[pressed] * moved).sum())
-        return work
-
-    def _kinetic(self, before: Array, after: Array, mask: NDArray[np.bool_]) -> float:
-        """v(n-1/2) . M v(n+1/2) / 2 of some nodes [J], as records have it."""
-        return float(0.5 * self.solver.model.mass[mask] @ (before[mask] * after[mask]).sum(axis=1))
-
-    @staticmethod
-    def _arrays(state: State) -> list[wp.array]:
-        """Of nodes, and of rigid bodies."""
-        return [state.v, state.rigid.momentum, state.rigid.spin]

@@ -19,7 +19,8 @@ def headlines(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         )
     yield from _phases(summary.get("phases", ()))
     peaks = ", ".join(f"{_force(F)} at {1e3 * t:.3f} ms" for t, F in summary["F_n_peaks"])
-    yield "F_n peaks", peaks or "none"
+    rising = f"none yet, {_force(summary['F_n_max'])} at most so far" if summary.get("F_n_max") else "none"
+    yield "F_n peaks", peaks or rising
     yield "F_t", f"{_force(summary['F_t_min'])} to {_force(summary['F_t_max'])}"
     yield "contact", _spans(summary["contacts"])
     yield "sticking", _spans(summary["sticks"])

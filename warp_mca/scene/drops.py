@@ -42,6 +42,7 @@ FLOORS: dict[str, Elastic | None] = {
 }
 GAP = 1e-6  # between the lowest node and the floor at the start [m]
 _SWELLING = 1e-4  # of the diagonal of the parts: more of it, into which bolts may press them before the fall [-]
+_STILL = 1e-3  # of the energy with which bolts move them, which is far less than that of a fall [-]
 _SPEED, _PASSES, _ROWS = 5000.0, 20, 400  # of waves in metals [m/s], along the parts in a run, intervals of output
 _WIDTH, _DEPTH, _CELLS = 1.25, 0.45, 20  # of a real floor over the diagonal of the parts [-], cells along its width
 _ANGLES = re.compile(r"([^/]+)/([^/]+)")
@@ -113,7 +114,7 @@ def _settled(more: dict[str, Any], extent: Extent) -> tuple[float, dict[str, Any
     """Gap to the floor [m], and the fields of a scene, whose bolts are tightened before the impact."""
     if not any(isinstance(load, Bolt) and load.preload for load in more.get("loads", ())):
         return GAP, more
-    return GAP + _SWELLING * extent.diagonal, {"phases": (Settle(falling=True),), **more}
+    return GAP + _SWELLING * extent.diagonal, {"phases": (Settle(falling=True, tolerance=_STILL),), **more}
 
 
 def _check(bodies: Sequence[Body], contacts: Sequence[object], onto: str, more: Mapping[str, object]) -> None:

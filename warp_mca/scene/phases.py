@@ -176,7 +176,7 @@ class Settle:
     Attributes:
         duration: the run stops if they do not rest by then [s].
         tolerance: they rest when their kinetic energy has stayed below this share of its greatest value for as long as
-            they took to reach that [-].
+            they took to reach that, and for a quarter of the period of what still moves [-].
         falling: bodies with an initial velocity do not wait: they settle without it and take it when the impact begins.
             Nothing has weight meanwhile, as in free fall. For parts with bolts that fall on a floor out of their reach.
     """

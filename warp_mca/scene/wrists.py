@@ -20,8 +20,8 @@ NEAR = 1e-6  # of their distance from the body's origin: places so near each oth
 def without_shared_nodes(scene: Scene) -> tuple[Joint, ...]:
     """The joints of a scene, with `nodes=None` where rigid bodies have two whose nodes may be the same.
 
-    A node may be in one joint alone. Rigid bodies need no nodes for theirs, so that axes may cross, as in a wrist. Swings
-    and phases before the impact know no joints without nodes; there all stay as they are.
+    A node may be in one joint alone. Rigid bodies need no nodes for theirs, so that axes may cross, as in a wrist.
+    Swings and phases before the impact know no joints without nodes; there all stay as they are.
     """
     if scene.rigid is not None or scene.phases:
         return scene.joints
@@ -29,7 +29,8 @@ def without_shared_nodes(scene: Scene) -> tuple[Joint, ...]:
     meeting = [joint for joint in scene.joints if isinstance(joint, Revolute | Spherical) and joint.nodes is not None]
     shared = set()
     for one, two in combinations(meeting, 2):
-        if any(_meet(one, two, name) for name in {one.body, one.other} & {two.body, two.other} & set(scene.rigid_names)):
+        both = {one.body, one.other} & {two.body, two.other} & set(scene.rigid_names)
+        if any(_meet(one, two, name) for name in both):
             shared |= {joint.name for joint in (one, two) if {joint.body, joint.other} <= rigid}
     return tuple(_free(joint) if joint.name in shared else joint for joint in scene.joints)
 
