@@ -252,3 +252,24 @@ def test_moduli_are_those_of_small_strain_and_survive_a_change():
     assert rubber.shear_modulus == pytest.approx(G / 0.49)
     heavier = dataclasses.replace(mca.Prony(elastic=rubber, g=(0.2,), tau=(1e-3,)), g=(0.3,))
     assert heavier.E == rubber.E and heavier.rho == rubber.rho
+
+
+@pytest.mark.parametrize("given", [{"rigid": True}, {}, {"material": mca.Elastic(E=4e5, nu=0.3, rho=1000.0)}])
+def test_strain_of_rubber_is_not_put_on_what_it_strikes(given: dict):
+    """A warning that a body of small strain reached a strain of 0.3, which was in the rubber, also of rigid bodies."""
+    rubber, steel = mca.NeoHookean(C10=0.4e6, nu=0.3, rho=1100.0), mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
+    cube = mca.Box(size=(0.01, 0.01, 0.01), divisions=(2, 2, 2))
+    common = {"geometry": cube, "element": "hex8"}
+    pad = mca.Body(name="pad", material=rubber, kinematics="finite", velocity=(0.0, -8.0, 0.0), **common)
+    base = mca.Body(name="base", position=(0.0, -0.01, 0.0), **common | {"material": steel} | given)
+    slave, master = mca.Surface(body="pad", nodes="ymin"), mca.Surface(body="base", nodes="ymax")
+    scene = mca.Scene(
+        name="pad on a base",
+        bodies=(pad, base),
+        contacts=(mca.Contact(slave=slave, master=master, two_way=True),),
+        impact=mca.ImpactPhase(duration=6e-4, output_interval=6e-6, energy_tolerance=1.0),
+    )
+    result = mca.run(scene)
+    said = [text for text in result.warnings if "strains as small" in text]
+    assert result.summary["max_strain"] > 0.1
+    assert len(said) == ("material" in given) and all("if that was in base" in text for text in said)

@@ -118,7 +118,7 @@ def _(beyond: bool) -> list[str]:
 
 
 def small_strain(row: Row, **kept: float) -> list[str]:
-    return told(row, scene=stacked(2, 2), ledger=ledger(kept))
+    return told(row, scene=stacked(2, 2), ledger=ledger(kept), peaks={})
 
 
 @pair(elements.scattered_pressure)

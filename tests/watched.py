@@ -45,7 +45,8 @@ def told_of(row: Row, scene: mca.Scene, meshes: Mapping[str, mca.Mesh] | None = 
     ready = prepared(scene, meshes)
     context = Context(scene=scene, meshes=ready.meshes, model=ready.model)
     still = np.zeros_like(ready.model.X)
-    common = {"start": ready.start, "nodes": context.nodes, "u": still, "v": still, "stopped": False, "origin": 0.0}
+    common = {"start": ready.start, "nodes": context.nodes, "u": still, "v": still, "stopped": False}
+    common |= {"origin": 0.0, "peaks": {}}
     return told(row, **vars(context), **{"ledger": ledger(), **common, **facts})
 
 

@@ -134,7 +134,8 @@ class SceneRun:
         shares = spring_shares(self._context, self.ledger, contact_names(ready.scene.contacts), self._depths)
         summary = summarise(own.history, self._facts(wall, shares), own.contacts)
         summary |= self._rigid_facts(own.history, stopped is not None)
-        told = self._told(stopped is not None, history=own.history, contacts=own.contacts, shares=shares, origin=origin)
+        facts = {"history": own.history, "contacts": own.contacts, "shares": shares, "peaks": summary["bodies"]}
+        told = self._told(stopped is not None, origin=origin, **facts)
         found = joined(ready.scene, ready.probes, [*before, own])
         last = slice(-len(own.history["time_s"]) if ready.scene.phases else 0, None)
         seen, cut = ([item.at(last) for item in found[name]] for name in ("probes", "sections"))

@@ -4,16 +4,20 @@ shakes up."""
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
 from warp_mca.geometry.cell_types import linear_type
 from warp_mca.geometry.quality import volumes
 from warp_mca.physics.elements.cells import body_cells, body_materials
+from warp_mca.scene import Body
+from warp_mca.scene.materials import J2Bilinear, J2Table, J2Voce, JohnsonCook, Material
 from warp_mca.watch.row import Context, Finished, Kind, Values, When, row
 
 ROUNDING = 1.4 * 2.0**-24  # of dilatation in float32 in each step, over the strain; measured, see docs/decisions.md
+METALS = (J2Bilinear, J2Voce, J2Table, JohnsonCook)  # whose von Mises stress over 3 G is their elastic strain
 STRAIN = 0.1  # taken as small, from which on stresses are off by a tenth of themselves
 _SMALL = "the co-rotational element takes strains as small, expect stresses off by as much"
 
@@ -90,7 +94,7 @@ def single_layer(c: Context, most: float) -> Iterator[Values]:
 def large_strain(c: Finished, most: float) -> Iterator[Values]:
     """Greatest deviatoric strain, where bodies have kinematics='corotational'."""
     if c.ledger.kept.max_strain > most:
-        yield from (dict(strain=c.ledger.kept.max_strain, where=where) for where in _where_small(c))
+        yield from (dict(strain=c.ledger.kept.max_strain, where=where) for where in _where_small(c, most))
 
 
 @row(
@@ -106,11 +110,25 @@ def lost_volume(c: Finished, most: float) -> Iterator[Values]:
         yield from (dict(lost=lost, where=where) for where in _where_small(c))
 
 
-def _where_small(c: Finished) -> Iterator[str]:
-    """Which bodies take strain as small, if any do; empty where all do."""
-    small = [body.name for body in c.scene.bodies if body.kinematics == "corotational"]
+def _where_small(c: Finished, strain: float = math.inf) -> Iterator[str]:
+    """Which bodies take strain as small, if any do, but those that did not reach `strain` if others may have."""
+    flexible = [body for body in c.scene.bodies if not body.rigid]
+    small = [body for body in flexible if body.kinematics == "corotational"]
+    reached = [body for body in small if not _stayed_below(strain, body, c.peaks.get(body.name, {}))]
+    if reached or len(small) < len(flexible):
+        small = reached
     if small:
-        yield "" if len(small) == len(c.scene.bodies) else f", if that was in {' or '.join(small)}"
+        names = " or ".join(body.name for body in small)
+        yield "" if len(small) == len(flexible) else f", if that was in {names}"
+
+
+def _stayed_below(strain: float, body: Body, peaks: Mapping[str, Any]) -> bool:
+    """Whether elastic and plastic strain of a body of metals say so, twice over, since these peaks are of records."""
+    materials = [body.material] if isinstance(body.material, Material) else list(body.material.values())
+    if math.isinf(strain) or not peaks or any(item.law and not isinstance(item, METALS) for item in materials):
+        return False
+    elastic = peaks["max_von_mises"]["value"] / (3.0 * min(item.shear_modulus for item in materials))
+    return 2.0 * (elastic + peaks["max_plastic_strain"]["value"]) < strain
 
 
 @row(

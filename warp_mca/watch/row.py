@@ -145,6 +145,7 @@ class Finished(Context):
         watch: what may go into each other.
         stopped: whether a guard stopped the run.
         origin: when the times that are told begin [s].
+        peaks: of each body by name, as `bodies` in the summary has them.
         rigid: extremes of rigid bodies and their joints; None without such bodies.
     """
 
@@ -161,6 +162,7 @@ class Finished(Context):
     watch: Watch
     stopped: bool
     origin: float
+    peaks: Mapping[str, Mapping[str, Any]]
     rigid: RigidExtremes | None = None
 
 
