@@ -139,13 +139,20 @@ def spring_shares(
     for k, name in enumerate(names):
         own = springs[:, [item.contact == k for item in c.model.passes]]
         force, held = own[..., PRESSURE].sum(axis=1), own[..., SPRING_ENERGY].sum(axis=1)
+        contact = c.scene.contacts[k]
+        pulled = not force.any() and isinstance(contact, Contact) and contact.bond is not None
+        if pulled:
+            force = np.maximum(held, 0.0)  # in proportion to its square
         greatest = int(force.argmax()) if len(force) else 0
         if not len(force) or force[greatest] <= 0.0 or exchanged[greatest] <= MIN_EXCHANGE * ledger.kept.energy_scale:
             continue
         row = _row_at_rest(c, k, force, greatest)
         if row is None:
             share, edges = float(held[greatest] / exchanged[greatest]), on_edges(c.model, k, depths)
-            loss = PEAK_LOSS * share if edges else _loss(c, k, share, float(force[greatest]), ledger.time())
+            in_series = float(energy["contact"][greatest] / series[greatest]) if series[greatest] > 0.0 else 0.0
+            loss = _loss(c, k, share, in_series, math.inf if pulled else float(force[greatest]), ledger.time())
+            if edges and k not in _curved(c.model):
+                loss = PEAK_LOSS * share
             found[name] = SpringShare(share=share, loss=loss, edges=edges)
         else:
             loss = float(energy["contact"][row] / series[row])
@@ -179,28 +186,43 @@ def _curved(model: Model) -> set[int]:
     return {item.contact for item in model.passes if is_curved_contact(model.X, item)}
 
 
-def _loss(c: Context, k: int, share: float, force: float, time: float) -> float:
+def _loss(c: Context, k: int, share: float, in_series: float, force: float, time: float) -> float:
     """Relative loss of the peak of contact k whose springs held a share then: `PEAK_LOSS` of it on curved surfaces.
 
     On flat ones it is that of a mass on two springs in series, 1 - sqrt(1 - s), but none of the force of a single wave.
+    Drives that press bodies on each other lose all that springs in series with these take, `in_series`.
     """
     contact = c.scene.contacts[k]
     if not isinstance(contact, Contact) or k in _curved(c.model):
         return PEAK_LOSS * share
     given, wave = contact.penalty is not None, _wave_force(c, k, contact, time)
+    if (speed := _driven_speed(c)) and math.isinf(wave):
+        return in_series if force > WAVE[True] * _wave_force(c, k, contact, time, speed) else 0.0
+    if math.isinf(force):  # of a bond that is pulled
+        return 0.0
     if force > WAVE[given] * wave:
         return 1.0 - math.sqrt(1.0 - min(share, 1.0))
     return PEAK_LOSS * share if given and force < WEAK * wave else 0.0
 
 
-def _wave_force(c: Context, k: int, contact: Contact, time: float) -> float:
-    """Force that a single wave gives in contact k by `time` [N]: Z v A, inf of rigid bodies and where none approach."""
+def _driven_speed(c: Context) -> float:
+    """Greatest speed of drives that move nodes [m/s]."""
+    return max((max(map(abs, item.velocity_table[1])) for item in c.scene.prescribed), default=0.0)
+
+
+def _wave_force(c: Context, k: int, contact: Contact, time: float, driven: float = 0.0) -> float:
+    """Force that a single wave gives in contact k by `time` [N]: Z v A, inf of rigid bodies and where none approach.
+
+    With a `driven` speed [m/s] it counts in place of that at which bodies approach.
+    """
     names, axis = sides_of(contact), c.model.contact_axes[k, 0]
     means = [c.model.V[c.nodes(name)].mean(axis=0) for name in names]
     between = (means[0] - means[1] if len(means) > 1 else means[0]) + time * c.model.gravity[0]
     normal = axis if axis.any() else between / max(float(np.linalg.norm(between)), 1e-30)
     speed = abs(float(between @ normal))
+    if driven:
+        speed = driven
     soft = [impedance(c, name)[0] for name in names if not c.scene.body(name).rigid]
-    if not soft or speed <= STILL * float(np.linalg.norm(between)):
+    if not soft or (not driven and speed <= STILL * float(np.linalg.norm(between))):
         return math.inf
     return speed / sum(1.0 / Z for Z in soft) * min(shadow(c, name, normal) for name in names)

@@ -90,7 +90,8 @@ def build(load: Spring, assembly: Bodies) -> SpringNodes:
     between = (places[1] if len(places) > 1 else ground) - places[0]
     direction, n, length = np.zeros(3), np.zeros(3), float(np.linalg.norm(between))
     if load.direction is not None:
-        n = direction = np.array(load.direction) / np.linalg.norm(load.direction)
+        n = np.array(load.direction) / np.linalg.norm(load.direction)
+        n = direction = -n if n @ between < -1e-9 * length else n  # it pulls its points together, however it is given
         length = float(direction @ between)
     elif length > 1e-9 * float(np.abs(assembly.X).max()):
         n = between / length
