@@ -1,16 +1,19 @@
 """Owns what bolts have beside their springs: how they are tightened, and the forces in their shanks.
 
-While a bolt is tightened, L_0 of its springs follows their length L, so that nothing but the preload pulls. That grows
-as P s^2 (3 - 2 s) over the share s of its rise. What tightens a bolt does the external work
+While a bolt is tightened, L_0 of its straight springs follows their mean elongation, and that of the slanted ones
+theirs, so that along the shank nothing but the preload pulls; against shear and bending it is as stiff as ever. The preload grows as P s^2 (3 - 2 s) over the share s of
+its rise. What tightens a bolt does the external work
 
-    dW = -r dP - P dL,
+    dW = (e - r) dP - T dL_0,
 
 with the elongation r at which the springs store no energy: what they store, and what they do on the bodies.
 """
 
 import warp as wp
 
-from warp_mca.kernels.nodes.spring import Springs, between_ends, direction_of
+from warp_mca.kernels.nodes.spring import Springs, between_ends, direction_of, table_at
+
+GROUPS = wp.vec2d(3.0, 6.0)  # straight and slanted springs of a bolt
 
 
 @wp.struct
@@ -18,12 +21,18 @@ class Shanks:
     """What tightens bolts.
 
     Attributes:
-        preload: of each spring at the end [N], shape (spring_count,), float64.
-        rise: time in which it grows [s], shape (spring_count,), float64.
+        begin: first spring of each, and the number of all, shape (bolt_count + 1,), int32.
+        length: L_0 of each spring before [m], shape (spring_count,), float64.
+        preload: of each at the end [N], shape (spring_count,), float64.
+        slanted: 1 of slanted ones, else 0 [-], shape (spring_count,), int32.
+        rise: time in which the preload grows [s], shape (bolt_count,), float64.
         tightens: 1 while it does [-], shape (1,), int32.
     """
 
+    begin: wp.array(dtype=wp.int32)
+    length: wp.array(dtype=wp.float64)
     preload: wp.array(dtype=wp.float64)
+    slanted: wp.array(dtype=wp.int32)
     rise: wp.array(dtype=wp.float64)
     tightens: wp.array(dtype=wp.int32)
 
@@ -35,7 +44,7 @@ class ShankState:
     Attributes:
         length: L_0 of each spring [m], shape (spring_count,), float64.
         preload: of each [N], shape (spring_count,), float64.
-        turned: time for which it has been tightened [s], shape (spring_count,), float64.
+        turned: time for which each bolt has been tightened [s], shape (bolt_count,), float64.
         work: W [J], shape (spring_count,), float64.
     """
 
@@ -45,30 +54,50 @@ class ShankState:
     work: wp.array(dtype=wp.float64)
 
 
+@wp.func
+def force_at(j: int, springs: Springs, P: wp.float64, e: wp.float64) -> wp.float64:
+    """Tension of spring j with a preload and an elongation."""
+    stiff = table_at(springs.tables[2 * j], springs.tables[2 * j + 1], springs.x, springs.y, e)
+    return P + stiff[0]
+
+
 @wp.kernel(enable_backward=False)
 def tighten_bolts(
     springs: Springs,
     shanks: Shanks,
+    elongation: wp.array(dtype=wp.float64),
     X: wp.array(dtype=wp.vec3d),
     u: wp.array(dtype=wp.vec3d),
     dt: wp.float64,
     state_out: ShankState,
 ):
-    """Let L_0 follow L and the preload grow, a block of threads for each spring; at the start dt is 0."""
-    j, lane = wp.tid()
+    """Let L_0 follow mean elongations, and the preload grow, a block of threads for each bolt; at the start dt is 0.
+
+    `elongation` is e of each spring a step before [m], shape (spring_count,).
+    """
+    b, lane = wp.tid()
     if shanks.tightens[0] > 0:
-        L = wp.length(between_ends(j, lane, springs, X, u))
+        mean = wp.vec2d()
+        for j in range(shanks.begin[b], shanks.begin[b + 1]):
+            k = shanks.slanted[j]
+            mean[k] += (wp.length(between_ends(j, lane, springs, X, u)) - shanks.length[j]) / wp.static(GROUPS)[k]
+        turned = state_out.turned[b] + dt
+        s = wp.min(turned / shanks.rise[b], wp.float64(1.0))
+        grown = s * s * (wp.float64(3.0) - wp.float64(2.0) * s)
+        for j in range(shanks.begin[b], shanks.begin[b + 1]):
+            L = wp.length(between_ends(j, lane, springs, X, u))
+            if lane == 0:
+                before = state_out.preload[j]
+                P = grown * shanks.preload[j]
+                L_0 = shanks.length[j] + mean[shanks.slanted[j]]
+                e = L - L_0
+                T = wp.float64(0.5) * (force_at(j, springs, before, elongation[j]) + force_at(j, springs, P, e))
+                work = (P - before) * (wp.float64(0.5) * (e + elongation[j]) - springs.rest[j])
+                state_out.work[j] = state_out.work[j] + work - T * (L_0 - state_out.length[j])
+                state_out.length[j] = L_0
+                state_out.preload[j] = P
         if lane == 0:
-            turned = state_out.turned[j] + dt
-            s = wp.min(turned / shanks.rise[j], wp.float64(1.0))
-            before = state_out.preload[j]
-            P = shanks.preload[j] * s * s * (wp.float64(3.0) - wp.float64(2.0) * s)
-            way = L - state_out.length[j]
-            work = (before - P) * springs.rest[j] - wp.float64(0.5) * (before + P) * way
-            state_out.work[j] = state_out.work[j] + work
-            state_out.length[j] = L
-            state_out.preload[j] = P
-            state_out.turned[j] = turned
+            state_out.turned[b] = turned
 
 
 @wp.kernel(enable_backward=False)

@@ -22,11 +22,11 @@ class Bolt(Load):
     """A round elastic shank from a body to another one, with a preload: a Timoshenko beam without mass.
 
     Its axial stiffness is E A / L, with A = pi d^2 / 4 and the length L between its ends. It bears shear and bending,
-    too, and does not yield. Each end moves with the nodes of its body within `reach`, by their mean motion and
+    too, does not yield, and bears compression where a head would lift. Each end moves with the nodes of its body within `reach`, by their mean motion and
     rotation, weighted by mass. Bodies in contact stay so; a hole needs no mesh.
 
-    Phases before the impact (`Settle`) tighten it: meanwhile it pulls with the preload alone, and from then on with
-    what its ends move, so that the impact begins with this very preload.
+    Phases before the impact (`Settle`) tighten it: meanwhile it pulls along its shank with the preload alone, and from
+    then on with what its ends move, so that the impact begins with this very preload.
 
     Attributes:
         name: of the columns `bolt_<name>_N`, axial force, and `bolt_<name>_shear_N`, and of `bolts` in the summary.

@@ -23,7 +23,7 @@ import numpy as np
 
 from warp_mca.base.arrays import Array, Index
 from warp_mca.base.errors import bad_value
-from warp_mca.base.joining import ITEMS, joinable
+from warp_mca.base.joining import AS_IS, ITEMS, joinable
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.physics.loads.bolts_stage import BoltsStage as Stage
 from warp_mca.physics.loads.springs import WHOLE, SpringNodes, lightness
@@ -46,9 +46,13 @@ class BoltNodes(LoadedNodes):
 
     Attributes:
         bars: its springs.
+        slanted: 1 of slanted ones, else 0 [-], shape (9,), int32.
+        rise: time in which its preload grows [s].
     """
 
     bars: tuple[SpringNodes, ...] = field(metadata=ITEMS)
+    slanted: Index = field(metadata=AS_IS)
+    rise: float = field(metadata=AS_IS)
 
     def eigenvalues(self, mass: Array) -> Array:
         """Those of its springs."""
@@ -107,7 +111,9 @@ def build(load: Bolt, assembly: Bodies) -> BoltNodes:
     ]
     bars = tuple(_bar(assembly, load, own, ends, i, j) for i in range(3) for j in range(3))
     node = np.concatenate([bar.node for bar in bars])
-    return BoltNodes(node=node, name=load.name, bars=bars)
+    slanted = 1 - np.eye(3, dtype=np.int32).ravel()
+    rise = RISE * (L + _reach(load)) / _speed(assembly, load)
+    return BoltNodes(node=node, name=load.name, bars=bars, slanted=slanted, rise=rise)
 
 
 def _place(assembly: Bodies, body: str, at: Vec3) -> Array:
@@ -168,7 +174,6 @@ def _bar(assembly: Bodies, load: Bolt, own: Truss, ends: list[End], i: int, j: i
         lowest=0.0,
         table=np.array([[0.0, 1.0], [0.0, k]]),
         damper=np.zeros((2, 0)),
-        rise=RISE * (length + _reach(load)) / _speed(assembly, load),
     )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import warp as wp
 
 from warp_mca.base.joining import offsets
@@ -25,7 +26,7 @@ class BoltsState(SpringsState):
     Attributes:
         length: L_0 of each spring [m], shape (count,), float64.
         preload: of each [N], shape (count,), float64.
-        turned: time for which it has been tightened [s], shape (count,), float64.
+        turned: time for which each bolt has been tightened [s], shape (bolt_count,), float64.
         work: of what tightens it up to t(n) [J], shape (count,), float64.
     """
 
@@ -41,23 +42,27 @@ class BoltsStage(SpringsStage):
     def __init__(self, solver: System, name: str) -> None:
         """Allocate on the current device."""
         super().__init__(solver, name)
-        self.begin = wp.array(offsets([len(item.bars) for item in self.items]), dtype=wp.int32)
-        self.axial, self.shear = (wp.zeros(len(self.items), dtype=wp.float64) for _ in range(2))
-        self.shanks = bolt.Shanks()
-        self.shanks.preload, self.shanks.rise = self.preload, self.numbers("rise")
-        self.shanks.tightens = wp.zeros(1, dtype=wp.int32)
+        bolts, own = self.items, bolt.Shanks()
+        self.axial, self.shear = (wp.zeros(len(bolts), dtype=wp.float64) for _ in range(2))
+        own.begin = wp.array(offsets([len(item.bars) for item in bolts]), dtype=wp.int32)
+        own.length, own.preload = self.length, self.preload
+        own.slanted = wp.array(np.concatenate([item.slanted for item in bolts]), dtype=wp.int32)
+        own.rise = wp.array([item.rise for item in bolts], dtype=wp.float64)
+        own.tightens = wp.zeros(1, dtype=wp.int32)
+        self.shanks = own
 
     def tighten(self, on: bool) -> float:
         """Bolts are tightened from now on, or no more; the longest rise of their preloads [s]."""
         self.shanks.tightens.fill_(int(on))
-        return max(bar.rise for bar in self.bars)
+        return max(item.rise for item in self.items)
 
     def new_state(self) -> BoltsState:
         """State before the first step, on the current device."""
         springs = super().new_state()
         own = {field.name: getattr(springs, field.name) for field in fields(springs)}
-        zeros = {key: wp.zeros(self.count, dtype=wp.float64) for key in ("preload", "turned", "work")}
-        return BoltsState(**own, **zeros, length=wp.clone(self.length))
+        preload, work = (wp.zeros(self.count, dtype=wp.float64) for _ in range(2))
+        turned = wp.zeros(len(self.items), dtype=wp.float64)
+        return BoltsState(**own, length=wp.clone(self.length), preload=preload, turned=turned, work=work)
 
     def record_kernels(self) -> list[Any]:
         """Those of a step, which have blocks of Warp's own size."""
@@ -68,8 +73,9 @@ class BoltsStage(SpringsStage):
         state, kept = step.state.parts[self.name], bolt.ShankState()
         for key in ("length", "preload", "turned", "work"):
             setattr(kept, key, getattr(state, key))
-        inputs = [self.springs, self.shanks, self.work.X, step.state.u, 0.0 if start else self.dt]
-        wp.launch(bolt.tighten_bolts, (self.count, self.lanes), inputs=inputs, outputs=[kept], block_dim=BLOCK)
+        dt = 0.0 if start else self.dt
+        inputs = [self.springs, self.shanks, state.elongation, self.work.X, step.state.u, dt]
+        wp.launch(bolt.tighten_bolts, (len(self.items), self.lanes), inputs=inputs, outputs=[kept], block_dim=BLOCK)
         self.pull(step, start, state.length, state.preload)
 
     def energies_of(self, state: State) -> Sequence[wp.array]:
@@ -79,7 +85,7 @@ class BoltsStage(SpringsStage):
 
     def readings_of(self, state: State) -> Sequence[wp.array]:
         """Axial and shear force."""
-        inputs = [self.begin, self.springs, state.parts[self.name].tension, self.work.X, state.u]
+        inputs = [self.shanks.begin, self.springs, state.parts[self.name].tension, self.work.X, state.u]
         outputs = [self.axial, self.shear]
         threads = (len(self.items), self.lanes)
         wp.launch(bolt.read_bolts, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK)

@@ -42,7 +42,6 @@ class SpringNodes(LoadedNodes):
         rest: elongation without tension, at which no energy is stored [m]; 0 where there is none.
         lowest: integral of the table from its first entry to it [J].
         table, damper: of tension over elongation [m], [N], and over its speed [m/s], [N], shape (2, count), float64.
-        rise: time in which the preload of a bolt grows [s]; 0 for others.
     """
 
     middle: int = field(metadata=AS_IS)
@@ -58,7 +57,6 @@ class SpringNodes(LoadedNodes):
     lowest: float = field(metadata=AS_IS)
     table: Array = field(metadata=AS_IS)
     damper: Array = field(metadata=AS_IS)
-    rise: float = field(default=0.0, metadata=AS_IS)
 
     @property
     def bars(self) -> tuple[SpringNodes, ...]:
