@@ -147,7 +147,7 @@ def test_words():
 
 @pytest.mark.parametrize("bond", [None, mca.Bond()])
 def test_what_springs_take_of_a_slow_drive_is_said(bond: mca.Bond | None):
-    """Halves of a bar that a drive presses on each other, or pulls where they are glued: springs and cells in series."""
+    """Halves of a bar that a drive presses on each other, or pulls where they are glued: in series with springs."""
     size, strain = 0.02, -1e-3 if bond is None else 1e-3
     steel = mca.Elastic(E=210e9, nu=0.0, rho=7850.0)
     half = mca.Box(size=(0.5 * size, size, size), divisions=(2, 2, 2))

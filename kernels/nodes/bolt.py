@@ -1,8 +1,8 @@
 """Owns what bolts have beside their springs: how they are tightened, and the forces in their shanks.
 
 While a bolt is tightened, L_0 of its straight springs follows their mean elongation, and that of the slanted ones
-theirs, so that along the shank nothing but the preload pulls; against shear and bending it is as stiff as ever. The preload grows as P s^2 (3 - 2 s) over the share s of
-its rise. What tightens a bolt does the external work
+theirs, so that along the shank nothing but the preload pulls; against shear and bending it is as stiff as ever. The
+preload grows as P s^2 (3 - 2 s) over the share s of its rise. What tightens a bolt does the external work
 
     dW = (e - r) dP - T dL_0,
 

@@ -22,8 +22,8 @@ class Bolt(Load):
     """A round elastic shank from a body to another one, with a preload: a Timoshenko beam without mass.
 
     Its axial stiffness is E A / L, with A = pi d^2 / 4 and the length L between its ends. It bears shear and bending,
-    too, does not yield, and bears compression where a head would lift. Each end moves with the nodes of its body within `reach`, by their mean motion and
-    rotation, weighted by mass. Bodies in contact stay so; a hole needs no mesh.
+    too, does not yield, and bears compression where a head would lift. Each end moves with the nodes of its body within
+    `reach`, by their mean motion and rotation, weighted by mass. Bodies in contact stay so; a hole needs no mesh.
 
     Phases before the impact (`Settle`) tighten it: meanwhile it pulls along its shank with the preload alone, and from
     then on with what its ends move, so that the impact begins with this very preload.
