@@ -83,8 +83,8 @@ def test_strain_of_one_kind_of_body_is_not_laid_to_the_other():
     drive = mca.Prescribed(body="upper", nodes="ymax", axis="y", times=(0.0,), velocities=(200.0,))
     held = mca.Fixed(body="upper", nodes="ymin")
     pulled = replace(scene, bodies=(scene.bodies[0], stretched), prescribed=(drive,), fixed=(held,))
-    said, _ = mca.run(replace(pulled, impact=mca.ImpactPhase(duration=2.5e-5, energy_tolerance=1.0))).warnings
-    assert said.endswith("choose kinematics='finite', if that was in lower")
+    told = mca.run(replace(pulled, impact=mca.ImpactPhase(duration=2.5e-5, energy_tolerance=1.0))).warnings
+    assert not [sentence for sentence in told if "choose kinematics='finite'" in sentence]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -38,7 +38,7 @@ DAMPING_MUTATIONS: dict[str, Mutation] = {
     "springs_stiff": Mutation(
         "springs are stiffer by a hundredth",
         "kernels/nodes/spring.py",
-        "spring = share_of(turned, rise) * springs.preload[j] + stiff[0]",
-        "spring = share_of(turned, rise) * springs.preload[j] + wp.float64(1.01) * stiff[0]",
+        "spring = preload[j] + stiff[0]",
+        "spring = preload[j] + wp.float64(1.01) * stiff[0]",
     ),
 }

@@ -125,16 +125,18 @@ def frictionless_fit(c: Context, most: float) -> Iterator[Values]:
             yield dict(slave=contact.slave.body, master=contact.master.body)
 
 
-def on_edges(model: Model, k: int, depths: Sequence[Array]) -> bool:
+def on_edges(c: Context, k: int, depths: Sequence[Array]) -> bool:
     """Whether edges or corners bear contact k: no face of its slaves is pressed at all its corners.
 
+    Nothing is said of surfaces that change as elements fail.
+
     Args:
-        model: of the scene.
+        c: scene and model.
         k: number of the contact.
         depths: of each contact pass, largest penetration of each spring [m], shape (spring_count,).
     """
     found = False
-    for item, depth in zip(model.passes, depths, strict=True):
+    for item, depth in zip(c.model.passes, depths, strict=True) if not c.scene.failing else ():
         if item.contact == k and len(item.slave) and depth.any():
             deep = depth.reshape(len(item.slave), -1).max(axis=1)
             pressed = item.slave[deep > PRESSED * deep.max()]
@@ -152,7 +154,7 @@ def _few_nodes(c: Finished, k: int, patch: float) -> float:
     planes = sum(share > 0.0 for share in _held(c.model, item))
     # A plane of symmetry leaves half of the patch, and half of the force on nodes in it.
     count = c.ledger.nodes_at_peak(k) * math.sqrt(2.0) ** planes
-    few = count < patch if is_curved_contact(c.model.X, item) else on_edges(c.model, item.contact, c.depths)
+    few = count < patch if is_curved_contact(c.model.X, item) else on_edges(c, item.contact, c.depths)
     return count if few else 0.0
 
 

@@ -148,7 +148,7 @@ def spring_shares(
             continue
         row = _row_at_rest(c, k, force, greatest)
         if row is None:
-            share, edges = float(held[greatest] / exchanged[greatest]), on_edges(c.model, k, depths)
+            share, edges = float(held[greatest] / exchanged[greatest]), on_edges(c, k, depths)
             in_series = float(energy["contact"][greatest] / series[greatest]) if series[greatest] > 0.0 else 0.0
             loss = _loss(c, k, share, in_series, math.inf if pulled else float(force[greatest]), ledger.time())
             if edges and k not in _curved(c.model):
