@@ -185,6 +185,15 @@ def test_a_preload_alone_is_a_constant_force(damping: float):
     assert result.summary["energy_error"] < 1e-3  # of what the spring gave, though that is nothing at the start
 
 
+def test_a_direction_may_point_either_way():
+    """It pulls its points together, whichever way its direction is given."""
+    made = [
+        mca.run(hung(replace(SPRING, direction=(sign, 0.0, 0.0), preload=1.0), periods=0.1)) for sign in (1.0, -1.0)
+    ]
+    for name in ("spring_s_N", "spring_s_m", "E_spring"):
+        assert made[0][name].tobytes() == made[1][name].tobytes()
+
+
 def test_tables_of_force_and_of_damping_agree_with_an_integration_of_their_own():
     """m x'' = T(-x, -x'), by SciPy: extension and compression, the ends of the table passed, stiff and soft parts."""
     spring = replace(SPRING, stiffness=0.0, **TABLE, **DAMPER)

@@ -36,7 +36,8 @@ class Spring(Load):
         speeds, damping_forces: T_d as a table in place of damping, speeds of elongation [m/s] and tensions [N].
         length: at which T_s is taken at 0 [m]; None is L at the start of the impact phase.
         preload: tension beside T_s [N]; below 0 it pushes. Alone it is a constant force.
-        direction: along which L is measured and T acts, fixed in space [-]; None is the line between the points.
+        direction: along which L is measured and T acts, fixed in space [-], from the first point to the second one; the
+            other way round is turned. None is the line between the points.
     """
 
     name: str

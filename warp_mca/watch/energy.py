@@ -136,6 +136,7 @@ def spring_shares(
     exchanged = np.maximum(np.abs(kinetic - kinetic[:1]), stored - kinetic)
     series = energy["contact"] + energy["elastic"]  # what an interference stores in springs and bodies
     found: dict[str, SpringShare | None] = dict.fromkeys(names)
+    curved = _curved(c.model)
     for k, name in enumerate(names):
         own = springs[:, [item.contact == k for item in c.model.passes]]
         force, held = own[..., PRESSURE].sum(axis=1), own[..., SPRING_ENERGY].sum(axis=1)
@@ -148,11 +149,13 @@ def spring_shares(
             continue
         row = _row_at_rest(c, k, force, greatest)
         if row is None:
-            share, edges = float(held[greatest] / exchanged[greatest]), on_edges(c, k, depths)
-            in_series = float(energy["contact"][greatest] / series[greatest]) if series[greatest] > 0.0 else 0.0
-            loss = _loss(c, k, share, in_series, math.inf if pulled else float(force[greatest]), ledger.time())
-            if edges and k not in _curved(c.model):
-                loss = PEAK_LOSS * share
+            share = float(held[greatest] / exchanged[greatest])
+            flat = contact if isinstance(contact, Contact) and k not in curved else None
+            edges, loss = flat is not None and on_edges(c, k, depths), PEAK_LOSS * share
+            if flat is not None and not edges:
+                in_series = float(energy["contact"][greatest] / series[greatest]) if series[greatest] > 0.0 else 0.0
+                greatest_force = math.inf if pulled else float(force[greatest])
+                loss = _loss_of_flat(c, k, flat, share, in_series, greatest_force, ledger.time())
             found[name] = SpringShare(share=share, loss=loss, edges=edges)
         else:
             loss = float(energy["contact"][row] / series[row])
@@ -186,15 +189,14 @@ def _curved(model: Model) -> set[int]:
     return {item.contact for item in model.passes if is_curved_contact(model.X, item)}
 
 
-def _loss(c: Context, k: int, share: float, in_series: float, force: float, time: float) -> float:
-    """Relative loss of the peak of contact k whose springs held a share then: `PEAK_LOSS` of it on curved surfaces.
+def _loss_of_flat(
+    c: Context, k: int, contact: Contact, share: float, in_series: float, force: float, time: float
+) -> float:
+    """Relative loss of the peak of a flat contact k whose springs held a share then.
 
-    On flat ones it is that of a mass on two springs in series, 1 - sqrt(1 - s), but none of the force of a single wave.
-    Drives that press bodies on each other lose all that springs in series with these take, `in_series`.
+    It is that of a mass on two springs in series, 1 - sqrt(1 - s), but none of the force of a single wave. Drives that
+    press bodies on each other, or pull those that are bonded, lose all that springs take, `in_series`.
     """
-    contact = c.scene.contacts[k]
-    if not isinstance(contact, Contact) or k in _curved(c.model):
-        return PEAK_LOSS * share
     given, wave = contact.penalty is not None, _wave_force(c, k, contact, time)
     if (speed := _driven_speed(c)) and math.isinf(wave):
         return in_series if force > WAVE[True] * _wave_force(c, k, contact, time, speed) else 0.0
