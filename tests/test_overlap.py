@@ -27,7 +27,7 @@ VARIANTS = {
         *(node.integrate_kernel(Kind(p, not m, m, True), True, m, m) for p, m in TWO),
     ],
     "advance_absorbing": [absorbing.absorbing_kernel(Kind(p, m, m), m) for p, m in TWO],
-    "advance_bound": [constraint.bound_kernel(Kind(p, m, m), m) for p, m in TWO],
+    "advance_bound": [constraint.bound_kernel(Kind(p, m, m), m, driven=m) for p, m in TWO],
     "see_nodes": [floating.see_nodes],
     "touch_surface": [contact.surface_kernel(m, m) for _, m in TWO],
     "touch_sides": [sides.sided_kernel(True, True, 3)],  # takes 7 s to compile

@@ -141,13 +141,13 @@ def bound_node(k: int, bonds: Bonds):
 
 
 @cache
-def bound_kernel(own: Kind, partial: bool = False, skips: bool = False) -> Any:
+def bound_kernel(own: Kind, partial: bool = False, skips: bool = False, driven: bool = True) -> Any:
     """Kernel: a step of tied pairs, then of driven nodes; arguments as in `node.integrate_kernel`.
 
     Coincident pairs take their mass-weighted mean motion; a pair without a second node is held by the ground. With
     `partial`, they do so in the directions that are tied: v + P (mean - v) in place of the mean, for a projector P.
     impulse_out [N s] sums the impulse that the joint gave to each pair's first node. `skips`: some pairs hold nodes of
-    rigid bodies, which `rigid_body.advance_kernel` advances.
+    rigid bodies, which `rigid_body.advance_kernel` advances. Without `driven`, there are pairs only.
     """
     vec3, Vector, Index = scalars(own.precision).vec3, kind(wp.vec3d, own.each), kind(wp.int32, own.each)
     total_force = total_force_function(own)
@@ -198,7 +198,7 @@ def bound_kernel(own: Kind, partial: bool = False, skips: bool = False) -> Any:
                 u = u_free + bonds.tied[k] * (u - u_free)
                 v = free + bonds.tied[k] * (v - free)
             impulse_out[k] = impulse_out[k] + m * (v - free)
-        else:
+        elif wp.static(driven):
             v = drive(k - bonds.first.shape[0], m, dt, bonds, free, work_out, work_after_out, clock_out)
             u = u_free + dt * (v - free)
         move(i, u, v, state_out)

@@ -89,8 +89,11 @@ def tie_function(partial: bool) -> Any:
 
 
 @cache
-def bound_role(precision: str, partial: bool, turned: bool) -> Any:
-    """The function that moves bound nodes and keeps the greatest normal force, in each of the kernel's steps."""
+def bound_role(precision: str, partial: bool, turned: bool, driven: bool) -> Any:
+    """The function that moves bound nodes and keeps the greatest normal force, in each of the kernel's steps.
+
+    Without `driven`, there are pairs only.
+    """
     vec3 = scalars(precision).vec3
     gather_held, tie = gather_function(precision, turned), tie_function(partial)
 
@@ -139,7 +142,7 @@ def bound_role(precision: str, partial: bool, turned: bool) -> Any:
                 if lane < pairs:
                     one, other = tie(lane, one, other, bonds)
                     push = one.mass * (one.v - free)
-                else:
+                elif wp.static(driven):
                     one.v = drive(lane - pairs, one.mass, dt, bonds, free, work_out, work_after_out, clock_out)
                     one.u = one.u + dt * (one.v - free)
                 put(one, state_out)

@@ -60,21 +60,22 @@ def resident_kernel(
     friction: bool,
     contact_laws: Laws,
     partial: bool,
+    driven: bool,
     coupled: bool,
 ) -> Any:
     """Kernel: take `steps` steps of a model of one block of hexahedra, with contact if `contact`, pins if `coupled`.
 
     Arguments are those of the kernels that take the same steps one by one: `patch_kernel`, `contact`, `nodes.node`,
     `nodes.constraint`, `nodes.couple`. `viscous`: elements have bulk viscosity; `turned`: they compute in floating
-    frames. count_out are the counts of `meeting`, zero before and after. `maker` makes the element, see
-    `patch_kernel.PatchElement`.
+    frames; `driven`: some nodes are. count_out are the counts of `meeting`, zero before and after. `maker` makes the
+    element, see `patch_kernel.PatchElement`.
     """
     t = scalars(precision)
     R, vec3, point = t.real, t.vec3, POINT[precision]
     compute_patch = patch_role(maker, precision, law_name, viscous, turned)
     move_free = free_role(precision, contact, turned)
     touch_slaves, move_masters = contact_role(friction, contact_laws), master_role(precision, turned)
-    move_bound, move_pinned = bound_role(precision, partial, turned), pin_role(precision, turned)
+    move_bound, move_pinned = bound_role(precision, partial, turned, driven), pin_role(precision, turned)
 
     @wp.func
     def give_forces(

@@ -61,7 +61,9 @@ class NodeStage(Actor):
         """The kernels; `fixed` and `early` as `node.integrate_kernel` has them."""
         own = self.constraints
         self.integrate_kernel = node.integrate_kernel(self.kind, fixed, own.bound, early)
-        self.bound_kernel = constraint.bound_kernel(self.kind, own.partial, own.skips) if own.count else None
+        self.bound_kernel = None
+        if own.count:
+            self.bound_kernel = constraint.bound_kernel(self.kind, own.partial, own.skips, own.driven > 0)
 
     def kernels(self) -> list[Any]:
         """Those of a step."""

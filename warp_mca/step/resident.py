@@ -121,6 +121,7 @@ class Resident:
             friction,
             contact.laws if contact else PLAIN,
             solver.constraints.partial and not solver.couplings.count,
+            solver.constraints.driven > 0,
             solver.couplings.count > 0,
         )
         self.count = wp.zeros(COUNTS, dtype=wp.int32)
