@@ -273,3 +273,25 @@ def test_strain_of_rubber_is_not_put_on_what_it_strikes(given: dict):
     said = [text for text in result.warnings if "strains as small" in text]
     assert result.summary["max_strain"] > 0.1
     assert len(said) == ("material" in given) and all("if that was in base" in text for text in said)
+
+
+@pytest.mark.parametrize(("element", "nu", "n"), [("hex8r", 0.3, 2), ("tet10_mean", 0.45, 2), ("hex8", 0.45, 5)])
+def test_rubber_that_buckles_as_it_is_pressed_is_told(element: str, nu: float, n: int):
+    """A block folds on its way to 0.4 of its length; one that is pressed to 0.5 is right, and silent."""
+    rubber = mca.Ogden(mu=(0.63e6, 0.0012e6, -0.01e6), alpha=(1.3, 5.0, -2.0), nu=nu, rho=1100.0, least_stretch=0.34)
+    told = []
+    for stretch in (0.4, 0.5):
+        block = mca.Box(size=(0.02, 0.02, 0.02), divisions=(n, n, n))
+        body = mca.Body(name="block", geometry=block, material=rubber, element=element, kinematics="finite")
+        way = (0.0, (stretch - 1.0) * 0.02, (stretch - 1.0) * 0.02)
+        press = mca.Prescribed(body="block", nodes="xmax", axis="x", times=(0.0, 0.04, 0.06), displacements=way)
+        scene = mca.Scene(
+            name="block",
+            bodies=(body,),
+            fixed=tuple(mca.Fixed(body="block", nodes=f"{axis}min", axes=axis) for axis in "xyz"),
+            prescribed=(press,),
+            loads=(mca.Damping(body="block", mass=400.0, about="ground"),),
+            impact=mca.ImpactPhase(duration=0.06, output_interval=1e-3),
+        )
+        told.append(any("folded" in warning for warning in mca.run(scene, device="cpu", figures="none").warnings))
+    assert told == [True, False]
