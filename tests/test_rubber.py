@@ -11,6 +11,7 @@ import warp as wp
 from impacts import finished, result_of
 from outside import goes_on, holds_up, same, striking
 from scipy.linalg import expm
+from scipy.optimize import brentq
 from test_elements import KINDS, held_of, settled
 
 import warp_mca as mca
@@ -273,3 +274,57 @@ def test_strain_of_rubber_is_not_put_on_what_it_strikes(given: dict):
     said = [text for text in result.warnings if "strains as small" in text]
     assert result.summary["max_strain"] > 0.1
     assert len(said) == ("material" in given) and all("if that was in base" in text for text in said)
+
+
+@pytest.mark.parametrize(("element", "nu", "n"), [("hex8r", 0.3, 2), ("tet10_mean", 0.45, 2), ("hex8", 0.45, 5)])
+def test_rubber_that_buckles_as_it_is_pressed_is_told(element: str, nu: float, n: int):
+    """A block folds on its way to 0.4 of its length; one that is pressed to 0.5 is right, and silent."""
+    rubber = mca.Ogden(mu=(0.63e6, 0.0012e6, -0.01e6), alpha=(1.3, 5.0, -2.0), nu=nu, rho=1100.0, least_stretch=0.34)
+    told = []
+    for stretch in (0.4, 0.5):
+        block = mca.Box(size=(0.02, 0.02, 0.02), divisions=(n, n, n))
+        body = mca.Body(name="block", geometry=block, material=rubber, element=element, kinematics="finite")
+        way = (0.0, (stretch - 1.0) * 0.02, (stretch - 1.0) * 0.02)
+        press = mca.Prescribed(body="block", nodes="xmax", axis="x", times=(0.0, 0.04, 0.06), displacements=way)
+        scene = mca.Scene(
+            name="block",
+            bodies=(body,),
+            fixed=tuple(mca.Fixed(body="block", nodes=f"{axis}min", axes=axis) for axis in "xyz"),
+            prescribed=(press,),
+            loads=(mca.Damping(body="block", mass=400.0, about="ground"),),
+            impact=mca.ImpactPhase(duration=0.06, output_interval=1e-3),
+        )
+        told.append(any("folded" in warning for warning in mca.run(scene, device="cpu", figures="none").warnings))
+    assert told == [True, False]
+
+
+def test_blocks_of_rubber_that_lie_on_each_other_stay_flush():
+    """Pressed to 0.8 of their length without friction they have the force of one block, with no stress across."""
+    C10, nu, stretch, side, end = 0.4e6, 0.45, 0.8, 0.02, 0.04
+    half = mca.Box(size=(side / 2, side, side), divisions=(2, 4, 4))
+    rubber = mca.NeoHookean(C10=C10, nu=nu, rho=1100.0)
+    bodies = [
+        mca.Body(name=name, geometry=half, material=rubber, element="hex8", kinematics="finite", position=(x, 0.0, 0.0))
+        for name, x in (("a", 0.0), ("b", side / 2))
+    ]
+    way = (0.0, (stretch - 1.0) * side, (stretch - 1.0) * side)
+    slave = mca.Surface(body="a", nodes="xmax")
+    scene = mca.Scene(
+        name="flush",
+        bodies=bodies,
+        fixed=[mca.Fixed(body=name, nodes=f"{axis}min", axes=axis) for name, axis in ("ax", "ay", "az", "by", "bz")],
+        contacts=[mca.Contact(slave=slave, master=mca.Surface(body="b", nodes="xmin"), penalty=10.0)],
+        prescribed=[mca.Prescribed(body="b", nodes="xmax", axis="x", times=(0.0, end, 1.5 * end), displacements=way)],
+        loads=[mca.Damping(body=name, mass=400.0, about="ground") for name in "ab"],
+        impact=mca.ImpactPhase(duration=1.5 * end, output_interval=1e-4),
+    )
+    result = mca.run(scene, device="cpu", figures="none")
+
+    def across(t: float) -> float:  # Kirchhoff stress where both stretches across are t
+        J = stretch * t * t
+        deviator = 2.0 / 3.0 * C10 * J ** (-2.0 / 3.0) * (t * t - stretch**2)
+        return deviator + 4.0 / 3.0 * C10 * (1.0 + nu) / (1.0 - 2.0 * nu) * np.log(J)
+
+    t = brentq(across, 1.0, 1.3)
+    along = 2.0 * C10 * (stretch * t * t) ** (-2.0 / 3.0) * (stretch**2 - t * t)  # Kirchhoff stress less that across
+    assert result.F_n[-1] == pytest.approx(-along / stretch * side**2, rel=1e-2)

@@ -26,6 +26,7 @@ K = 100.0
 W = math.sqrt(K / M)
 CENTRE = (0.0, 0.0, 0.0)
 SPRING = mca.Spring(name="s", body="a", at=CENTRE, other_at=(0.05, 0.0, 0.0), stiffness=K)
+WHOLE_STEP = mca.ImpactPhase(duration=1e-4, output_interval=1e-5, time_step_scale=1.0, energy_tolerance=1e-2)
 # a bilinear spring, soft in extension, that pushes hard; and a dashpot that closes hard
 TABLE = {"elongations": (-1.0, 0.0, 1e-3, 2e-3), "forces": (-200.0, 0.0, 0.05, 0.15)}
 DAMPER = {"speeds": (-1.0, 0.0, 1.0), "damping_forces": (-0.2, 0.0, 0.05)}
@@ -185,6 +186,43 @@ def test_a_preload_alone_is_a_constant_force(damping: float):
     assert result.summary["energy_error"] < 1e-3  # of what the spring gave, though that is nothing at the start
 
 
+def test_a_dashpot_has_the_speed_of_its_own_time_whatever_else_moves_its_point():
+    """A block falls through oil: g m / c (t - m / c (1 - exp(-c t / m))), to 1e-4, in steps of 0.007 m / c."""
+    g, c = 9.81, 4.0 * M * W
+    times = 8.0 * M / c
+    dashpot = replace(SPRING, stiffness=0.0, damping=c, direction=(1.0, 0.0, 0.0))
+    impact = mca.ImpactPhase(duration=times, output_interval=times / 40.0)
+    scene = hung(dashpot, gravity=(-g, 0.0, 0.0), impact=impact)
+    run = finished(scene, precision="float64")
+    assert c * run.solver.dt / M > 0.005
+    result = result_of(run)
+    t, way = result.time, result["spring_s_m"] - result["spring_s_m"][0]
+    exact = g * M / c * (t + M / c * np.expm1(-c * t / M))
+    assert np.abs(way - exact).max() < 1e-4 * exact[-1]
+
+
+def test_a_dashpot_at_one_node_slows_a_whole_body():
+    """By exp(-c t / m), to 1e-3, though its elements hold that node back: a lag would tell of the node alone."""
+    c = 0.005 * M * math.sqrt(STEEL.E / STEEL.rho) / SIDE
+    span = 0.5 * M / c
+    dashpot = replace(SPRING, at=(0.5 * SIDE, 0.0, 0.0), stiffness=0.0, damping=c)
+    impact = mca.ImpactPhase(duration=span, output_interval=span / 20.0)
+    result = mca.run(hung(dashpot, bodies=(moving(BLOCK, 1.0),), impact=impact), device="cpu", precision="float64")
+    assert result["E_damping"][-1] == pytest.approx(0.5 * M * -math.expm1(-1.0), rel=1e-3)
+
+
+def test_strong_dashpots_at_one_node_are_stable_at_the_whole_stable_step():
+    """Three of them, as their decay and as the frequency of the elements decide."""
+    for c in (1e2, 1e4, 1e6):
+        dashpots = [replace(SPRING, name=n, at=(0.5 * SIDE,) * 3, stiffness=0.0, damping=c) for n in "abc"]
+        dt = begun(hung(*dashpots, bodies=(BLOCK,), impact=WHOLE_STEP)).solver.model.stable.dt
+        impact = replace(WHOLE_STEP, duration=400.0 * dt, output_interval=40.0 * dt)
+        run = begun(hung(*dashpots, bodies=(moving(BLOCK, 1.0),), impact=impact), precision="float64")
+        run.advance()
+        assert run.stopped == [None]
+        assert abs(result_of(run).summary["energy"]["error"]) < 1e-2 * 0.5 * M
+
+
 def test_a_direction_may_point_either_way():
     """It pulls its points together, whichever way its direction is given."""
     made = [
@@ -244,9 +282,8 @@ def _spin(run: Any) -> np.ndarray:
 def test_the_stable_step_counts_springs():
     """Noise on a stiff spring at one node, at the whole stable step: energy stays."""
     spring = replace(SPRING, at=(0.5 * SIDE,) * 3, stiffness=1e10, damping=10.0)
-    impact = mca.ImpactPhase(duration=1e-4, output_interval=1e-5, time_step_scale=1.0, energy_tolerance=1e-2)
-    run = begun(hung(spring, bodies=(moving(BLOCK, 1.0),), impact=impact), precision="float64")
-    plain = begun(hung(bodies=(BLOCK,), impact=impact)).solver.model.stable.dt
+    run = begun(hung(spring, bodies=(moving(BLOCK, 1.0),), impact=WHOLE_STEP), precision="float64")
+    plain = begun(hung(bodies=(BLOCK,), impact=WHOLE_STEP)).solver.model.stable.dt
     assert run.solver.model.stable.dt < 0.5 * plain
     run.advance()
     assert run.stopped == [None]

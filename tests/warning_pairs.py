@@ -31,6 +31,7 @@ from warp_mca.watch import (
     contacts,
     elements,
     energy,
+    folding,
     guards,
     histories,
     inertia,
@@ -40,7 +41,7 @@ from warp_mca.watch import (
     units,
     vibration,
 )
-from warp_mca.watch.bent_cells import COLUMNS, FLOWING, MISSED, RIGHT
+from warp_mca.watch.bent_cells import COLUMNS, FLOWING, FOLDED, MISSED, RIGHT
 from warp_mca.watch.row import Row, SpringShare
 
 Pair = Callable[[bool], list[str]]
@@ -190,6 +191,11 @@ def _(beyond: bool) -> list[str]:
 @pair(bending.bending_without_flow)
 def _(beyond: bool) -> list[str]:
     return bent(bending.bending_without_flow, MISSED, over(bending.bending_without_flow, beyond), plastic=True)
+
+
+@pair(folding.folded_rubber)
+def _(beyond: bool) -> list[str]:
+    return bent(folding.folded_rubber, FOLDED, over(folding.folded_rubber, beyond))  # of one cell, itself all of them
 
 
 # energy

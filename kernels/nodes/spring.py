@@ -5,12 +5,14 @@ first point to the second one, and the length L between them, the tension is
 
     T = T_s(L - L_0) + T_d(dL/dt),   w T n on the nodes of the first point, -w T n on those of the second.
 
-T_s and T_d are piecewise linear, beyond their ends with the slope there. At t(n) the speed is known half a step before;
-what T itself adds until t(n) counts, by the lightness l of both points (1/m of a mass):
+T_s and T_d are piecewise linear, beyond their ends with the slope there. At t(n) the speed s is known half a step
+before; what T itself adds until t(n) counts, by the lightness l of both points (1/m of a mass), and what all else adds
+to it, as it was a step before:
 
-    T (1 + dt l T_d' / 2) = T_s + T_d(speed at n-1/2),
+    T (1 + dt l T_d' / 2) = T_s + T_d(s(n-1/2)) + dt T_d' a / 2,   a = (s(n-1/2) - s(n-3/2)) / dt + l T(n-1),
 
-so that a dashpot between two masses sees the mean of the speeds before and after, as central differences want it.
+so that a dashpot sees the mean of the speeds before and after, as central differences want it. For a node of frequency
+w and dashpots of a rate of decay b = T_d' l in all, stability asks for w^2 dt^2 + 4 b dt <= 4 at most.
 """
 
 import warp as wp
@@ -63,6 +65,7 @@ class SpringState:
         tension: T [N], shape (spring_count,), float64.
         elongation: L - L_0 [m], shape (spring_count,), float64.
         damper: tension of its dashpot along n [N], shape (spring_count,), vec3d.
+        speed: of its second point from its first one, half a step before [m/s], shape (spring_count,), vec3d.
         clock: 1 once it has taken a step [-], shape (spring_count,), int32.
     """
 
@@ -71,6 +74,7 @@ class SpringState:
     tension: wp.array(dtype=wp.float64)
     elongation: wp.array(dtype=wp.float64)
     damper: wp.array(dtype=wp.vec3d)
+    speed: wp.array(dtype=wp.vec3d)
     clock: wp.array(dtype=wp.int32)
 
 
@@ -113,6 +117,7 @@ def count_taken(j: int, damper: wp.vec3d, speed: wp.vec3d, dt: wp.float64, state
         taken = wp.float64(0.5) * dt * wp.dot(state_out.damper[j] + damper, speed)
         state_out.taken[j] = state_out.taken[j] + taken
     state_out.damper[j] = damper
+    state_out.speed[j] = speed
     state_out.clock[j] = 1
 
 
@@ -167,7 +172,11 @@ def pull_springs(
         spring = preload[j] + stiff[0]
         T = spring + damp[0]
         if keeps:  # else the speed is that at t = 0
-            T /= wp.float64(1.0) + wp.float64(0.5) * dt * springs.lightness[j] * damp[1]
+            half = wp.float64(0.5) * dt * damp[1]
+            if state_out.clock[j] > 0:
+                given = wp.dot(n, speed - state_out.speed[j]) / dt
+                T += half * (given + springs.lightness[j] * state_out.tension[j])
+            T /= wp.float64(1.0) + half * springs.lightness[j]
         for k in range(begin + lane, middle, wp.block_dim()):
             i = springs.node[k]
             nodal_force_out[i] = nodal_force_out[i] + springs.weight[k] * T * n

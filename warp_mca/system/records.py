@@ -53,7 +53,7 @@ class SceneRecords:
     path_stress: list[NDArray[np.float32]] = field(default_factory=list)
     sensors: list[Array] = field(default_factory=list)
     peaks: Array = field(default_factory=lambda: np.zeros((0, 2)))
-    stiffened: Array = field(default_factory=lambda: np.zeros((0, 6)))
+    stiffened: Array = field(default_factory=lambda: np.zeros((0, 7)))
     passed: Array = field(default_factory=lambda: np.zeros((0, 6)))
     due: int = 0
     apart: int = 0

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from warp_mca.geometry.cell_types import HEXAHEDRON, WEDGE
 from warp_mca.geometry.degenerate import among
 from warp_mca.watch import bent_hexahedra, strain_jumps
-from warp_mca.watch.bent_cells import BENT, COLUMNS, FLOW, FLOWING, MISSED, RIGHT, SPENT, Cells
+from warp_mca.watch.bent_cells import BENT, COLUMNS, FLOW, FLOWING, FOLDED, MISSED, RIGHT, SPENT, Cells
+from warp_mca.watch.folding import corner_volumes, folded, may_fold
 from warp_mca.watch.row import Array, Finished, Values, When, row
 
 if TYPE_CHECKING:
@@ -39,8 +40,9 @@ LEAST = 0.02  # of the energy that bodies exchanged: less strain energy says not
 FREE = 1e-4  # of all energy: rounding leaves less in bodies that move free of stress
 LOOKS = 8  # in a run, besides that at its end
 
-# What finds the energies, and what prepares it, by element and whether cells are wedges.
-_ENERGIES: dict[tuple[str, bool], tuple[Callable[[Array, Cells], Array], Callable[[Cells], object]]] = {
+Found = tuple[Callable[[Array, Cells], Array], Callable[[Cells], object]]  # what finds columns, and what prepares it
+# That of energies, by element and whether cells are wedges.
+_ENERGIES: dict[tuple[str, bool], Found] = {
     ("hex8", False): (bent_hexahedra.full_hexahedra, bent_hexahedra.bricks_of),
     ("hex8", True): (partial(strain_jumps.wedges, element="hex8"), strain_jumps.wedges_of),
     ("hex8i", False): (bent_hexahedra.enriched_hexahedra, bent_hexahedra.bricks_of),
@@ -57,7 +59,8 @@ def samples_of(model: Model) -> list[Cells]:
     """Cells of a scene's model that are looked at."""
     found = []
     for block in model.blocks:
-        if not any(block.element == element for element, _ in _ENERGIES):
+        folds = may_fold(block)
+        if not (folds or any(block.element == element for element, _ in _ENERGIES)):
             continue
         if block.failing:  # cells that fail are bent out of shape before
             continue
@@ -66,10 +69,14 @@ def samples_of(model: Model) -> list[Cells]:
         for k in np.flatnonzero(np.bincount(kind)):
             body, material = divmod(int(k), len(model.law))
             sigma_y = float(model.law[material, 2:3].sum()) if block.plastic else 0.0
+            if folds:
+                own = np.flatnonzero(kind == k)
+                found.append(_sample(model, block, own, body, material, False, sigma_y, (folded, corner_volumes)))
             for jumps in (False, True):
                 own = np.flatnonzero((kind == k) & (wedge == jumps))
                 if len(own) and (block.element, jumps) in _ENERGIES:
-                    cells = _sample(model, block, own, body, material, jumps, sigma_y)
+                    finds = _ENERGIES[block.element, jumps]
+                    cells = _sample(model, block, own, body, material, jumps, sigma_y, finds)
                     yields = sigma_y > 0.0 and block.element in ("hex8i", "hex8r")
                     if jumps or yields or block.element not in STRAIGHT or bent_hexahedra.lean(cells):
                         found.append(cells)
@@ -77,7 +84,7 @@ def samples_of(model: Model) -> list[Cells]:
 
 
 def _sample(
-    model: Model, block: Block, own: NDArray[np.intp], body: int, material: int, wedge: bool, sigma_y: float
+    model: Model, block: Block, own: NDArray[np.intp], body: int, material: int, wedge: bool, sigma_y: float, by: Found
 ) -> Cells:
     """The cells to look at out of the body's `own` ones of one material and type."""
     jumps = wedge or block.element == "tet4"
@@ -85,7 +92,7 @@ def _sample(
     cells = _with_neighbours(block.conn, chosen, own) if jumps else chosen
     conn = block.conn[list(WEDGE.stored_corners)] if block.element == "wedge6" else block.conn
     K, G = model.law[material, :2]
-    energies, prepare = _ENERGIES[block.element, wedge]
+    energies, prepare = by
     share = len(own) / len(chosen)
     return Cells(body, energies, conn[:, cells].T, len(chosen), K, G, sigma_y, share, model.X, prepare)
 
@@ -134,11 +141,13 @@ def seen(model: Model, samples: list[Cells], u: Array, before: Array) -> Array:
 def greater(found: Array, before: Array) -> Array:
     """Energies of each body, of what was found now or before, shape (body_count, COLUMNS) or empty.
 
-    It is that with more strain energy.
+    It is that with more strain energy, and of folded cells that with more.
     """
     before = before if before.shape == found.shape else np.zeros_like(found)
     more = found[:, SPENT, None] > before[:, SPENT, None]  # not-a-number is not greater
-    return np.where(more, found, before)
+    most = np.where(more, found, before)
+    most[:, FOLDED] = np.fmax(found[:, FOLDED], before[:, FOLDED])
+    return most
 
 
 @row(

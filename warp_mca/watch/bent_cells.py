@@ -20,7 +20,8 @@ BENT = 2  # the part of it that single cells spend on bending, or on jumps of st
 FLOWING = 3  # equivalent strain at the points of cells that yield, times volume [m^3]
 FLOW = 4  # the same of cells that bend right [m^3]
 MISSED = 5  # energy of bending stresses beyond the yield stress in cells that do not yield [J]
-COLUMNS = 6
+FOLDED = 6  # cells of rubber that are inside out at a corner, the most that a look saw [-]
+COLUMNS = 7
 
 
 @dataclass(frozen=True)

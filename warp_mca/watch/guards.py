@@ -54,7 +54,7 @@ def overflowed_list(c: Reading, _: float) -> Iterator[Values]:
 @flag(
     "stopped before t = {time:.4g} s: a node outran the contact search;",
     "choose a smaller output_interval, or, where no body is so fast, other cells under the contact, since these have "
-    "given way",
+    "given way, or, between soft bodies alike, mu and two_way=True",
 )
 def outrun_search(c: Reading, _: float) -> Iterator[Values]:
     """Way of nodes since the latest search for contact, against that for which lists of faces hold."""

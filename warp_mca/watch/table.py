@@ -14,6 +14,7 @@ from warp_mca.watch import (
     contacts,
     elements,
     energy,
+    folding,
     guards,
     histories,
     inertia,
@@ -36,7 +37,7 @@ def _rows(*modules: ModuleType) -> tuple[Row, ...]:
     return tuple(item for module in modules for item in vars(module).values() if isinstance(item, Row))
 
 
-FIGURES = _rows(elements, inertia, bending, energy, contacts, motion)
+FIGURES = _rows(elements, inertia, bending, folding, energy, contacts, motion)
 SCENES = _rows(meshes, units, articulations)
 EVENTS = _rows(passing, histories, vibration)
 TABLE = (*_rows(guards), *FIGURES, *SCENES, *EVENTS)

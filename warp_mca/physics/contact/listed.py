@@ -17,6 +17,7 @@ from warp_mca.physics.contact.resting import resting
 from warp_mca.physics.contact.skin_edges import edge_eigenvalues, edge_pass, is_two_way, no_edges
 from warp_mca.physics.contact.stiffness import Inertia
 from warp_mca.physics.contact.surfaces import contact_passes, faces_of
+from warp_mca.physics.elements.cells import body_materials
 from warp_mca.scene import Contact, RigidPlane, Surface
 from warp_mca.system.contact import ChosenPenalty, ContactPass, Faces
 
@@ -36,9 +37,19 @@ def as_settled(
     parts: Bodies, contact: Contact, slave: Faces, master: Faces | None, velocity: Array
 ) -> tuple[Contact, ChosenPenalty | None]:
     """A contact with all that is left to the program, and the penalty that was chosen."""
-    contact = replace(contact, two_way=is_two_way(contact, slave, master))
+    soft = master is not None and _soft(parts, contact)
+    contact = replace(contact, two_way=is_two_way(contact, slave, master, soft))
     contact, chosen = settled(parts, contact, slave, master, velocity)
     return resting(parts, contact, slave, master, velocity), chosen
+
+
+def _soft(parts: Bodies, contact: Contact) -> bool:
+    """Whether both bodies are flexible, and of materials for large strain only."""
+    bodies = [parts.scene.body(name) for name in contact.sides]
+    if any(body.rigid for body in bodies):
+        return False
+    materials = [item for body in bodies for item, _ in body_materials(body, parts.meshes[body.name])]
+    return all(item.finite_only for item in materials)
 
 
 def passes_of(

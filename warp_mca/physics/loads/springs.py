@@ -22,6 +22,8 @@ __all__ = ["SpringNodes", "Stage", "build"]
 WHOLE = 100.0
 # The same of dashpots: their first half step is explicit, so that a body comes (c l dt / 2)^2 short, 0.2 % here.
 BRAKED = 20.0
+# The same of those at nodes of flexible bodies, where what other forces do to the speed lags by a step: see the kernel.
+LAGGED = 2.0
 
 
 @joinable
@@ -68,7 +70,7 @@ class SpringNodes(LoadedNodes):
         return self.added
 
     def decays(self, mass: Array) -> Array:
-        """c l, BRAKED times as much at nodes of rigid bodies."""
+        """LAGGED times c l, BRAKED times at nodes of rigid bodies."""
         return self.decay
 
 
@@ -106,7 +108,7 @@ def build(load: Spring, assembly: Bodies) -> SpringNodes:
         rigid = assembly.scene.body(body).rigid
         whole = WHOLE * k * (share / assembly.mass[nodes] if share.min() >= 0.0 else np.full(len(nodes), light))
         added.append(whole if rigid else np.full(len(nodes), k * sum(own)))
-        decay.append(np.full(len(nodes), (BRAKED if rigid else 1.0) * c * sum(own)))
+        decay.append(np.full(len(nodes), (BRAKED if rigid else LAGGED) * c * sum(own)))
     return SpringNodes(
         node=node.astype(np.int32),
         name=load.name,

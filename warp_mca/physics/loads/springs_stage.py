@@ -32,6 +32,7 @@ class SpringsState:
         tension: T then [N], shape (count,), float64.
         elongation: L - L_0 then [m], shape (count,), float64.
         damper: tension of the dashpot along the spring then [N], shape (count,), vec3d.
+        speed: of the second point from the first one, half a step before [m/s], shape (count,), vec3d.
         clock: 1 once a spring has taken a step [-], shape (count,), int32.
     """
 
@@ -40,6 +41,7 @@ class SpringsState:
     tension: wp.array
     elongation: wp.array
     damper: wp.array
+    speed: wp.array
     clock: wp.array
 
 
@@ -78,8 +80,8 @@ class SpringsStage(NodalLoad):
     def new_state(self) -> SpringsState:
         """State before the first step, on the current device."""
         numbers = {key: wp.zeros(self.count, dtype=wp.float64) for key in ("energy", "taken", "tension", "elongation")}
-        damper, clock = wp.zeros(self.count, dtype=wp.vec3d), wp.zeros(self.count, dtype=wp.int32)
-        return SpringsState(**numbers, damper=damper, clock=clock)
+        vectors = {key: wp.zeros(self.count, dtype=wp.vec3d) for key in ("damper", "speed")}
+        return SpringsState(**numbers, **vectors, clock=wp.zeros(self.count, dtype=wp.int32))
 
     def record_kernels(self) -> list[Any]:
         """Those of a step, which have blocks of Warp's own size."""
@@ -99,7 +101,7 @@ class SpringsStage(NodalLoad):
         wp.launch(spring.pull_springs, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK)
 
     def feel(self, state: State, ahead: State, way: Array) -> None:
-        """Count what dashpots took."""
+        """Count what dashpots took; no force gave what speeds changed by."""
         own = state.parts[self.name]
         tension = 0.5 * (own.damper.numpy() + ahead.parts[self.name].damper.numpy())
         moved = np.zeros((self.count, 3))
@@ -107,6 +109,7 @@ class SpringsStage(NodalLoad):
             parts = item.weight[:, None] * way[item.node]
             moved[k] = parts[item.middle :].sum(axis=0) - parts[: item.middle].sum(axis=0)
         own.taken.assign(own.taken.numpy() + (tension * moved).sum(axis=1))
+        own.speed.assign(own.speed.numpy() - moved / self.dt)
 
     def energies_of(self, state: State) -> Sequence[wp.array]:
         """Stored, and taken by dashpots."""
