@@ -92,9 +92,10 @@ def build_model(
     Raises:
         RequestError: joints whose nodes do not coincide, nodes bound twice, unknown sets, cells without material.
     """
+    shape = X
     places, X = on_bonds(scene, meshes, X)
     ties = tied_nodes(scene, meshes, X)
-    parts = Assembly(scene, meshes, on_faces(ties, scene, X))
+    parts = Assembly(scene, meshes, on_faces(ties, scene, X), shape)
     velocity = velocities(ties, scene, X, V)
     pairs, joints, couplings = join_bodies(parts)
     soft = flexible(couplings, pairs, own_nodes(parts))

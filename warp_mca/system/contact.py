@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warp_mca.base.arrays import Array, Index
 from warp_mca.base.joining import AS_IS, joinable, of
@@ -50,6 +51,8 @@ class Faces:
         contact: E* A^2 / V of each face, with E* = E / (1 - nu^2) [N/m], shape (face_count,), float64.
         layer: M A / d of each face, with M of `flat_modulus` and the height d of its cell over it [N/m], shape
             (face_count,), float64.
+        curved: whether the surface that it belongs to is, before nodes move onto faces that carry them, shape
+            (face_count,), bool.
     """
 
     node: Index
@@ -61,6 +64,7 @@ class Faces:
     bulk: Array
     contact: Array
     layer: Array
+    curved: NDArray[np.bool_]
 
     @property
     def nodes(self) -> Index:
@@ -97,6 +101,7 @@ class ContactPass:
         face_offset, face_of_node: faces around each master node, compressed rows, int32.
         margin: that the search looks ahead [m].
         longest: edge of the largest face [m].
+        curved: whether one of its surfaces is; a plane is not.
         room: slave nodes that the list of a face holds.
         deepest: penetration of a plane that stops the run [m]; faces have half their own size.
         initial_overlap: as in `Contact`.
@@ -129,6 +134,7 @@ class ContactPass:
     face_of_node: Index = field(default_factory=lambda: np.zeros(0, np.int32), metadata=AS_IS)
     margin: float = field(default=0.0, metadata=AS_IS)
     longest: float = field(default=0.0, metadata=AS_IS)
+    curved: bool = field(default=False, metadata=AS_IS)
     room: int = field(default=LIST_LENGTH, metadata=AS_IS)
     deepest: float = field(default=0.0, metadata=AS_IS)
     initial_overlap: str = field(default="refuse", metadata=AS_IS)

@@ -33,12 +33,12 @@ class Given(NamedTuple):
 
 
 def as_settled(
-    parts: Bodies, contact: Contact, slave: Faces, master: Faces | None, velocity: Array
+    parts: Bodies, contact: Contact, slave: Faces, master: Faces | None, velocity: Array, flat: bool | None = None
 ) -> tuple[Contact, ChosenPenalty | None]:
-    """A contact with all that is left to the program, and the penalty that was chosen."""
+    """A contact with all that is left to the program, and the penalty that was chosen; `flat` as in `passes_of`."""
     contact = replace(contact, two_way=is_two_way(contact, slave, master))
     contact, chosen = settled(parts, contact, slave, master, velocity)
-    return resting(parts, contact, slave, master, velocity), chosen
+    return resting(parts, contact, slave, master, velocity, flat), chosen
 
 
 def passes_of(

@@ -27,11 +27,16 @@ if TYPE_CHECKING:
 CRITICAL = 0.5  # share of the critical damping of a slave node on its spring
 
 
-def resting(parts: Bodies, contact: Contact, slave: Faces, master: Faces | None, velocity: Array) -> Contact:
-    """The contact with its law, if that is left to the program; `velocity` of nodes [m/s], shape (node_count, 3)."""
+def resting(
+    parts: Bodies, contact: Contact, slave: Faces, master: Faces | None, velocity: Array, flat: bool | None = None
+) -> Contact:
+    """The contact with its law, if that is left to the program; `velocity` of nodes [m/s], shape (node_count, 3).
+
+    `flat` as in `spring_stiffness`.
+    """
     if contact.law is not None or not any(parts.scene.gravity):
         return contact
-    own, *other = spring_stiffness(replace(contact, two_way=False), slave, master)
+    own, *other = spring_stiffness(replace(contact, two_way=False), slave, master, flat)
     stiffness, bodies = own[0], [contact.slave.body]
     if isinstance(contact.master, RigidPlane):
         normal, speed = np.asarray(contact.master.normal, dtype=float), 0.0
