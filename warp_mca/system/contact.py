@@ -86,7 +86,6 @@ class ContactPass:
         friction_parameters: what their functions read, shape (slave_count, law_count, parameter_count), float64.
         stiffening: greatest slope of the law down to the penetration that stops the run, over the stiffness [-].
         damping: greatest slope of its dashpot over the rate, over the stiffness [s]; 0 without a dashpot.
-        decay: greatest of what dashpots add to the diagonal of M^-1 C, by the bound of `contact_eigenvalues` [1/s].
         slave_face, slave_offset, face_of_slave: the slave's faces, and those around each slave node, compressed rows,
             int32.
         sign: +1 where the forces on the slaves are the contact's forces, -1 in the return pass of two-way contact,
@@ -120,7 +119,6 @@ class ContactPass:
     friction: tuple[str, ...] = field(default=(), metadata=AS_IS)
     friction_parameters: Array = field(default_factory=lambda: np.zeros((0, 0, 0)), metadata=AS_IS)
     damping: float = field(default=0.0, metadata=AS_IS)
-    decay: float = field(default=0.0, metadata=AS_IS)
     plane: RigidPlane | None = field(default=None, metadata=AS_IS)
     face: Index = field(default_factory=lambda: np.zeros((0, 4), np.int32), metadata=of("nodes"))
     face_stiffness: Array = field(default_factory=lambda: np.zeros(0), metadata=AS_IS)
@@ -140,6 +138,11 @@ class ContactPass:
     initial_overlap: str = field(default="refuse", metadata=AS_IS)
     pairs: Pairs | None = field(default=None, metadata=AS_IS)
     bonds: BondedNodes | None = field(default=None, metadata=AS_IS)
+
+    @property
+    def decay_share(self) -> float:
+        """What its dashpots add to the diagonal of M^-1 C, over what its springs add to the eigenvalue there [s]."""
+        return self.damping / self.stiffening
 
     @property
     def leads(self) -> bool:

@@ -63,8 +63,7 @@ def passes_of(
         sides = (slave, master) if item.sign > 0.0 else (master, slave)
         assert sides[0] is not None
         nodes, value = contact_eigenvalues(item, sides[0], sides[1], parts.mass)
-        decay = item.damping * float(value.max()) / item.stiffening if item.damping else 0.0
-        given.append(Given(replace(item, decay=decay), nodes, value))
+        given.append(Given(item, nodes, value))
     if master is None:
         return given
     if edges := edge_pass(parts.X, Inertia.of(parts), found[0], slave, master, contact):

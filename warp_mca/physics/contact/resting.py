@@ -34,7 +34,8 @@ def resting(
 
     `flat` as in `spring_stiffness`.
     """
-    if contact.law is not None or not any(parts.scene.gravity):
+    tied = contact.bond is not None and not contact.bond.fails  # nothing bounces there
+    if contact.law is not None or tied or not any(parts.scene.gravity):
         return contact
     own, *other = spring_stiffness(replace(contact, two_way=False), slave, master, flat)
     stiffness, bodies = own[0], [contact.slave.body]
@@ -81,7 +82,7 @@ def at_rest(
 
 def undamped(model: Model, scene: Scene) -> Model:
     """The model without the dashpots that the program added."""
-    plain = {"law": Penalty.law, "parameters": (), "damping": 0.0, "decay": 0.0}
+    plain = {"law": Penalty.law, "parameters": (), "damping": 0.0}
     passes = (replace(k, **plain) if scene.contacts[k.contact].law is None else k for k in model.passes)
     return replace(model, passes=tuple(passes))
 
