@@ -227,3 +227,11 @@ def test_bonds_break_on_a_gpu_as_on_the_cpu(sets: tuple[str, str]):
     assert host.summary["bonds"]["fine–coarse"]["failed"] == device.summary["bonds"]["fine–coarse"]["failed"] == 25
     assert device.F_n == pytest.approx(host.F_n, abs=1e-3 * np.abs(host.F_n).max())
     assert all(np.array_equal(device[name], again[name], equal_nan=True) for name in device.history)
+
+
+def test_a_bond_that_never_fails_has_no_dashpots_of_bodies_at_rest():
+    """They took a third of the step of a phone's tied glass, which nothing bounces on."""
+    gravity = (0.0, 0.0, -9.81)
+    models = [prepared(halves(bond, gravity=gravity)).model for bond in (mca.Bond(), mca.Bond(normal=1e6))]
+    assert [item.damping > 0.0 for model in models for item in model.passes if item.leads] == [False, True]
+    assert models[0].stable.dt > models[1].stable.dt

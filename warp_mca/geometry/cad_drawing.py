@@ -61,7 +61,7 @@ def draw(gmsh: Any, path: str) -> tuple[str, ...]:
         Sentences on what is drawn otherwise than the file has it.
     """
     gmsh.merge(path)
-    notes = ()
+    notes: tuple[str, ...] = ()
     if Path(path).suffix.lower() == ".stl":
         _check_closed(gmsh, path)
         if _part_faces(gmsh, path) == _BLUNT:
@@ -75,6 +75,8 @@ def draw(gmsh: Any, path: str) -> tuple[str, ...]:
         gmsh.model.occ.synchronize()
     if not gmsh.model.getEntities(3):
         raise bad_value("Cad.path", path, "it holds no solid; save the part as a closed solid")
+    if loose := sum(not len(gmsh.model.getAdjacencies(2, face)[0]) for _, face in gmsh.model.getEntities(2)):
+        notes += (f"faces of {Path(path).name} that bound no solid are left out: {loose}",)
     return notes
 
 

@@ -110,7 +110,7 @@ def glued(gmsh: Any, names: Mapping[int, str], gap: float) -> dict[int, str]:
         gap: up to which faces count as one, in the model's unit.
 
     Raises:
-        RequestError: a solid has no face in common with another one.
+        RequestError: a solid has no face in common with another one, or lies within others.
     """
     if len(names) < 2:
         return dict(names)
@@ -123,6 +123,9 @@ def glued(gmsh: Any, names: Mapping[int, str], gap: float) -> dict[int, str]:
         for dim, piece in own:
             if dim == 3:
                 found.setdefault(piece, names[tag])
+    if lost := sorted(set(names.values()) - set(found.values())):
+        remedy = f"{' and '.join(lost)} lies in the solids before it, whose material counts: cut its place out of them"
+        raise bad_value("Cad.glue", True, f"{remedy} in the CAD program")
     joined, left = {next(iter(found))}, set(found)
     sides = {piece: {face for _, face in gmsh.model.getBoundary([(3, piece)], oriented=False)} for piece in found}
     while more := {p for p in left - joined if any(sides[p] & sides[other] for other in joined)}:

@@ -44,8 +44,14 @@ class Assembly(Bodies):
             where it is 1.
     """
 
-    def __init__(self, scene: Scene, meshes: Mapping[str, Mesh], X: Mapping[str, Array]) -> None:
-        super().__init__(scene, meshes, X)
+    def __init__(
+        self,
+        scene: Scene,
+        meshes: Mapping[str, Mesh],
+        X: Mapping[str, Array],
+        shape: Mapping[str, Array] | None = None,
+    ) -> None:
+        super().__init__(scene, meshes, X, shape)
         nodes, elements = len(self.X), self.element_count
         self.relief: Array | None = None
         self.cells = self._merged_cells()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 from warp_mca.base.arrays import Array
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.model.assembly import Assembly
-from warp_mca.model.damping import greatest_decay, with_damping
+from warp_mca.model.damping import load_decays, with_damping
 from warp_mca.model.mass_scaling import check_masses, scale_masses
 from warp_mca.model.own_steps import OwnSteps
 from warp_mca.model.rigid_step import bounce_factor, stable_with_rigid
@@ -40,19 +39,19 @@ Grouping = Callable[[Model, OwnSteps], Model]
 
 def _contacts(
     parts: Assembly, velocity: Array, places: Mapping[int, Place]
-) -> tuple[tuple[ContactPass, ...], Array, Array, tuple[ChosenPenalty | None, ...]]:
-    """Passes, the axes along which each contact's force is reported, what the springs add at each node, and penalties
-    that were chosen."""
+) -> tuple[tuple[ContactPass, ...], Array, Array, Array, tuple[ChosenPenalty | None, ...]]:
+    """Passes, the axes along which each contact's force is reported, what springs add to the eigenvalue and dashpots to
+    the rate of decay at each node, and penalties that were chosen."""
     passes: list[ContactPass] = []
     penalties: list[ChosenPenalty | None] = []
     axes = np.zeros((len(parts.scene.contacts), 2, 3))
-    added = np.zeros(len(parts.X))
+    added, decays = np.zeros((2, len(parts.X)))
     for index, contact in enumerate(parts.scene.contacts):
         if isinstance(contact, ContactAll):
             found, value = general_passes(parts, contact, index, velocity)
             added += value
-            decay = found[0].damping * float(value.max()) / found[0].stiffening if found[0].damping else 0.0
-            passes += [replace(item, decay=decay) for item in found]
+            decays += found[0].decay_share * value
+            passes += found
             penalties.append(None)
             continue
         slave = surface_faces(parts, contact.slave)
@@ -65,10 +64,11 @@ def _contacts(
         )
         for item, nodes, value in given:
             np.add.at(added, nodes, factor * value)
+            np.add.at(decays, nodes, item.decay_share * value)
             passes.append(item)
         added += factor * growth(parts, contact, index, given)
         axes[index] = contact_axes(parts.X, contact, slave, master)
-    return tuple(passes), axes, added, tuple(penalties)
+    return tuple(passes), axes, added, decays, tuple(penalties)
 
 
 @np.errstate(over="ignore", invalid="ignore")  # `stable_step` raises for values that are not finite
@@ -92,9 +92,10 @@ def build_model(
     Raises:
         RequestError: joints whose nodes do not coincide, nodes bound twice, unknown sets, cells without material.
     """
+    shape = X
     places, X = on_bonds(scene, meshes, X)
     ties = tied_nodes(scene, meshes, X)
-    parts = Assembly(scene, meshes, on_faces(ties, scene, X))
+    parts = Assembly(scene, meshes, on_faces(ties, scene, X), shape)
     velocity = velocities(ties, scene, X, V)
     pairs, joints, couplings = join_bodies(parts)
     soft = flexible(couplings, pairs, own_nodes(parts))
@@ -104,7 +105,7 @@ def build_model(
         pairs["joint_tied"][base.start : base.end] = 0.0
     held = constraints(parts, velocity)
     check_bindings(parts, joints, held, pairs)
-    passes, axes, added, penalties = _contacts(parts, velocity, places)
+    passes, axes, added, decays, penalties = _contacts(parts, velocity, places)
     absorbing = absorbing_nodes(parts, velocity, held, pairs)
     added[absorbing.node] += absorbing.eigenvalues(parts.mass)
     loads = loaded_nodes(parts, start, added, grouping is not None)
@@ -112,7 +113,7 @@ def build_model(
     check_ties(ties, held, [nodes_of(pairs), absorbing.node, *(body.nodes for body in rigid.rigid_bodies)])
     added, parts.relief = ties.shared(added, parts.mass), ties.relief(parts.mass)
     found: dict[str, Any] = {**_bodies(parts, watched), **held, **pairs}
-    found |= _steps(parts, rigid, added, velocity, passes, loads)
+    found |= _steps(parts, rigid, added, velocity, decays, loads)
     model = Model(
         V=velocity,
         **found,
@@ -156,13 +157,13 @@ def _steps(
     rigid: Rigid,
     added: Array,
     velocity: Array,
-    passes: Sequence[ContactPass],
+    decays: Array,
     loads: Mapping[str, Sequence[LoadedNodes]],
 ) -> dict[str, Any]:
     """Stable step and mass scaling, by the name of the attribute; mass scaling raises the masses of the assembly."""
     plain = stable_with_rigid(parts, rigid, added, velocity) if rigid.rigid_bodies else parts.stable(added)
     stable, scaling = scale_masses(parts, added, plain)
-    decay = sum(item.decay for item in passes) + greatest_decay(loads, parts.mass)
+    decay = float((decays + load_decays(loads, parts.mass)).max(initial=0.0))
     stable = with_damping(with_viscosity(stable, parts, velocity, decay), parts, loads, added, decay)
     check_masses(parts, scaling)
     return {"stable": stable, "scaling": scaling}

@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 Loads = Mapping[str, Sequence[LoadedNodes]]
 
 
-def greatest_decay(loads: Loads, mass: Array) -> float:
-    """Greatest rate of decay that dashpots of loads have at a node [1/s]."""
+def load_decays(loads: Loads, mass: Array) -> Array:
+    """Rate of decay that dashpots of loads have at each node [1/s], shape (node_count,), float64."""
     total = np.zeros(len(mass))
     for item in _all(loads):
         np.add.at(total, item.node, item.decays(mass))
-    return float(total.max(initial=0.0))
+    return total
 
 
 def with_damping(stable: StableStep, parts: Assembly, loads: Loads, added: Array, decay: float) -> StableStep:

@@ -15,7 +15,6 @@ from warp_mca.base.errors import GuardError
 from warp_mca.geometry.exposure import Exposure
 from warp_mca.model.assembly import Assembly
 from warp_mca.physics.contact.listed import as_settled, passes_of
-from warp_mca.physics.contact.stiffness import is_flat
 from warp_mca.physics.contact.surfaces import faces_of, surface_faces
 from warp_mca.scene import Contact, RigidPlane, Surface
 from warp_mca.step.contact_renewal import renew
@@ -45,16 +44,17 @@ class Exposed:
         bodies = [(body.name, ready.model.node_start[body.name]) for body in ready.scene.bodies]
         X = {name: ready.model.X[first : first + len(ready.meshes[name].points)] for name, first in bodies}
         self._parts = Assembly(ready.scene, ready.meshes, X)
-        self._contacts = [(k, *self._settled(item)) for k, item in enumerate(ready.scene.listed)]
+        self._contacts = [(k, *self._settled(k, item)) for k, item in enumerate(ready.scene.listed)]
 
-    def _settled(self, contact: Contact) -> tuple[Contact, bool]:
+    def _settled(self, index: int, contact: Contact) -> tuple[Contact, bool]:
         """A contact as it was at the start, and whether its surfaces were flat."""
         slave, master = (
             None if isinstance(surface, RigidPlane) else surface_faces(self._parts, surface)
             for surface in (contact.slave, contact.master)
         )
         assert slave is not None
-        return as_settled(self._parts, contact, slave, master, self._ready.model.V)[0], is_flat(slave, master)
+        flat = not any(item.curved for item in self.passes if item.contact == index)
+        return as_settled(self._parts, contact, slave, master, self._ready.model.V, flat)[0], flat
 
     @property
     def _blocks(self) -> list[tuple[int, Index]]:

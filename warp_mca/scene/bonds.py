@@ -36,3 +36,8 @@ class Bond:
         validate.plain(self)
         strengths = {"normal": self.normal, "shear": self.shear}
         validate.positive("Bond", gap=self.gap, **{k: value for k, value in strengths.items() if value is not None})
+
+    @property
+    def fails(self) -> bool:
+        """Whether any force breaks it."""
+        return self.normal is not None or self.shear is not None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from itertools import combinations
@@ -24,6 +24,8 @@ Join = str | Bond  # one of JOINS, or a bond that fails
 JOINS = ("glue", "tie", "contact", "apart")
 _HEALED = 2.0  # of the greatest gap or overlap of solids that are glued: faces as near count as one [-]
 _THIN = 0.05  # of the thinnest wall of these solids: no faces farther apart do [-]
+_SPANNED, _FACE = 1.5, 0.25  # times a gap that ties span, small edges of faces over the size of cells [-]
+_MOST = 0.5  # of the edge of a face: ties span no more [-]
 _LEAST = 1e-9  # distance within which faces always do [m]
 
 
@@ -128,7 +130,7 @@ class Assembly:
             if found[0] == "apart":
                 apart.append(("+".join(one), "+".join(other)))
             elif found[0] != "contact":
-                bond = found[0] if isinstance(found[0], Bond) else Bond()
+                bond = self._spanning(found[0] if isinstance(found[0], Bond) else Bond(), one, other)
                 finer, coarser = sorted((one, other), key=self._fineness)
                 slave, master = (Surface(body="+".join(group), nodes="boundary") for group in (finer, coarser))
                 listed.append(Contact(slave=slave, master=master, mu=self.mu, initial_overlap="stress_free", bond=bond))
@@ -205,6 +207,12 @@ class Assembly:
             material=materials[group[0]] if one else materials,
             kinematics="finite" if any(material.finite_only for material in materials.values()) else "corotational",
         )
+
+    def _spanning(self, bond: Bond, one: tuple[str, ...], other: tuple[str, ...]) -> Bond:
+        """A bond of two bodies that spans the gap or overlap between them, on the smallest faces too."""
+        worst = max(max(touch.gap, touch.depth) for touch in self.touching if _between(touch, one, other))
+        face = _FACE * min(self._fineness(group)[0] for group in (one, other))
+        return replace(bond, gap=max(bond.gap, min(_SPANNED * worst / face, _MOST)))
 
     def _size(self, name: str) -> float | None:
         if not isinstance(self.size, Mapping):

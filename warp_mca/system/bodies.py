@@ -22,6 +22,7 @@ class Bodies:
 
     Attributes:
         X: positions [m], shape (node_count, 3), float64.
+        shape: positions before ties and bonds moved nodes onto faces [m], shape (node_count, 3), float64.
         node_start, element_start: first node and element of each body, by name.
         rigid: whether each element belongs to a rigid body, and is not computed, shape (element_count,), bool.
         materials: those of the scene; `material` is each element's index among them.
@@ -40,7 +41,13 @@ class Bodies:
     face_height: Array
     mass: Array
 
-    def __init__(self, scene: Scene, meshes: Mapping[str, Mesh], X: Mapping[str, Array]) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        meshes: Mapping[str, Mesh],
+        X: Mapping[str, Array],
+        shape: Mapping[str, Array] | None = None,
+    ) -> None:
         self.scene, self.meshes = scene, meshes
         self.node_start: dict[str, int] = {}
         self.element_start: dict[str, int] = {}
@@ -51,6 +58,7 @@ class Bodies:
             elements += meshes[body.name].cell_count
         self.element_count = elements
         self.X: Array = np.concatenate([X[body.name] for body in scene.bodies])
+        self.shape = self.X if shape is None else np.concatenate([shape[body.name] for body in scene.bodies])
         count = [meshes[body.name].cell_count for body in scene.bodies]
         self.rigid: NDArray[np.bool_] = np.repeat([body.rigid for body in scene.bodies], count)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warp_mca.base.arrays import Array, Index
 from warp_mca.base.joining import AS_IS, joinable, of
@@ -50,6 +51,8 @@ class Faces:
         contact: E* A^2 / V of each face, with E* = E / (1 - nu^2) [N/m], shape (face_count,), float64.
         layer: M A / d of each face, with M of `flat_modulus` and the height d of its cell over it [N/m], shape
             (face_count,), float64.
+        curved: whether the surface that it belongs to is, before nodes move onto faces that carry them, shape
+            (face_count,), bool.
     """
 
     node: Index
@@ -61,6 +64,7 @@ class Faces:
     bulk: Array
     contact: Array
     layer: Array
+    curved: NDArray[np.bool_]
 
     @property
     def nodes(self) -> Index:
@@ -82,7 +86,6 @@ class ContactPass:
         friction_parameters: what their functions read, shape (slave_count, law_count, parameter_count), float64.
         stiffening: greatest slope of the law down to the penetration that stops the run, over the stiffness [-].
         damping: greatest slope of its dashpot over the rate, over the stiffness [s]; 0 without a dashpot.
-        decay: greatest of what dashpots add to the diagonal of M^-1 C, by the bound of `contact_eigenvalues` [1/s].
         slave_face, slave_offset, face_of_slave: the slave's faces, and those around each slave node, compressed rows,
             int32.
         sign: +1 where the forces on the slaves are the contact's forces, -1 in the return pass of two-way contact,
@@ -97,6 +100,7 @@ class ContactPass:
         face_offset, face_of_node: faces around each master node, compressed rows, int32.
         margin: that the search looks ahead [m].
         longest: edge of the largest face [m].
+        curved: whether one of its surfaces is; a plane is not.
         room: slave nodes that the list of a face holds.
         deepest: penetration of a plane that stops the run [m]; faces have half their own size.
         initial_overlap: as in `Contact`.
@@ -115,7 +119,6 @@ class ContactPass:
     friction: tuple[str, ...] = field(default=(), metadata=AS_IS)
     friction_parameters: Array = field(default_factory=lambda: np.zeros((0, 0, 0)), metadata=AS_IS)
     damping: float = field(default=0.0, metadata=AS_IS)
-    decay: float = field(default=0.0, metadata=AS_IS)
     plane: RigidPlane | None = field(default=None, metadata=AS_IS)
     face: Index = field(default_factory=lambda: np.zeros((0, 4), np.int32), metadata=of("nodes"))
     face_stiffness: Array = field(default_factory=lambda: np.zeros(0), metadata=AS_IS)
@@ -129,11 +132,17 @@ class ContactPass:
     face_of_node: Index = field(default_factory=lambda: np.zeros(0, np.int32), metadata=AS_IS)
     margin: float = field(default=0.0, metadata=AS_IS)
     longest: float = field(default=0.0, metadata=AS_IS)
+    curved: bool = field(default=False, metadata=AS_IS)
     room: int = field(default=LIST_LENGTH, metadata=AS_IS)
     deepest: float = field(default=0.0, metadata=AS_IS)
     initial_overlap: str = field(default="refuse", metadata=AS_IS)
     pairs: Pairs | None = field(default=None, metadata=AS_IS)
     bonds: BondedNodes | None = field(default=None, metadata=AS_IS)
+
+    @property
+    def decay_share(self) -> float:
+        """What its dashpots add to the diagonal of M^-1 C, over what its springs add to the eigenvalue there [s]."""
+        return self.damping / self.stiffening
 
     @property
     def leads(self) -> bool:

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.physics.contact.sides import face_geometry
-from warp_mca.physics.contact.surfaces import is_curved_contact
 from warp_mca.scene import RigidPlane
 from warp_mca.watch.row import Array, Context, Finished, Kind, Values, When, listed_passes, row
 
@@ -37,7 +36,7 @@ def small_patch(c: Finished, patch: float) -> Iterator[Values]:
     for k, item, contact in listed_passes(c.scene, c.model):
         alone = item.leads or (item.sign > 0.0 and item.contact not in by_nodes)  # edges
         if alone and contact.stiffness is None and (count := _few_nodes(c, k, patch)):
-            at_all = "less than three cells across" if is_curved_contact(c.model.X, item) else "a corner or an edge"
+            at_all = "less than three cells across" if item.curved else "a corner or an edge"
             yield dict(body=contact.slave.body, count=count, at_all=at_all)
 
 
@@ -114,7 +113,7 @@ def frictionless_fit(c: Context, most: float) -> Iterator[Values]:
     for _, item, contact in listed_passes(c.scene, c.model):
         if isinstance(contact.master, RigidPlane) or not item.leads or item.mu > 0.0 or item.friction or item.bonds:
             continue
-        if not is_curved_contact(c.model.X, item):
+        if not item.curved:
             continue
         area, normal = face_geometry(c.model.X, item.face)
         middle, X = c.model.X[item.face].mean(axis=1), c.model.X[item.slave]
@@ -154,7 +153,7 @@ def _few_nodes(c: Finished, k: int, patch: float) -> float:
     planes = sum(share > 0.0 for share in _held(c.model, item))
     # A plane of symmetry leaves half of the patch, and half of the force on nodes in it.
     count = c.ledger.nodes_at_peak(k) * math.sqrt(2.0) ** planes
-    few = count < patch if is_curved_contact(c.model.X, item) else on_edges(c, item.contact, c.depths)
+    few = count < patch if item.curved else on_edges(c, item.contact, c.depths)
     return count if few else 0.0
 
 
@@ -170,7 +169,7 @@ def _pressed(model: Model, item: ContactPass, count: float, depth: Array) -> tup
 
     depth = depth.reshape(len(item.slave), -1).max(axis=1)
     touched = np.flatnonzero(depth > 0.5 * depth.max(initial=0.0))
-    if not (len(touched) and is_curved_contact(model.X, item)):
+    if not (len(touched) and item.curved):
         return 1.0, 0.0
     patch = count * float(np.mean([_area_around(model.X, item, node) for node in touched.tolist()]))
     area, _ = face_geometry(model.X, item.face)

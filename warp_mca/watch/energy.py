@@ -10,7 +10,6 @@ import numpy as np
 
 from warp_mca.base.arrays import Array
 from warp_mca.kernels.records.columns import PRESSURE, SPRING_ENERGY
-from warp_mca.physics.contact.surfaces import is_curved_contact
 from warp_mca.physics.elements import ELEMENTS
 from warp_mca.scene import Contact, ContactAll, Settle, ThermalStrain
 from warp_mca.watch.contacts import on_edges
@@ -186,7 +185,7 @@ def _row_at_rest(c: Context, k: int, force: Array, greatest: int) -> int | None:
 
 def _curved(model: Model) -> set[int]:
     """Contacts of curved surfaces."""
-    return {item.contact for item in model.passes if is_curved_contact(model.X, item)}
+    return {item.contact for item in model.passes if item.curved}
 
 
 def _loss_of_flat(

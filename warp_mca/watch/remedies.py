@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warp_mca.physics.contact.surfaces import is_curved_contact
-
 if TYPE_CHECKING:
     from warp_mca.system.model import Model
 
@@ -38,7 +36,7 @@ def _meet_at_corners(model: Model) -> bool:
     from scipy.spatial import KDTree
 
     for item in model.passes:
-        if item.mu == 0.0 and len(item.face) and is_curved_contact(model.X, item):
+        if item.mu == 0.0 and len(item.face) and item.curved:
             apart, _ = KDTree(model.X[item.master]).query(model.X[item.slave])
             if (np.asarray(apart) < MEETING * np.sqrt(item.smallest_area)).sum() >= NODES:
                 return True

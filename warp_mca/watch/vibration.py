@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from warp_mca.kernels.records.columns import FRICTION, IMPULSE, NORMAL_IMPULSE, SPRING_ENERGY, STICK_IMPULSE
 from warp_mca.physics.contact.sides import face_geometry
-from warp_mca.physics.contact.surfaces import is_curved_contact
 from warp_mca.physics.elements.cells import body_materials
 from warp_mca.watch.row import Array, Context, Finished, Values, listed_passes, row, sides_of
 
@@ -173,7 +172,7 @@ def _is_first_impact(c: Finished, contact: Contact, item: ContactPass) -> bool:
         and not scene.body(contact.slave.body).rigid
         and not _is_held(c, contact.slave.body, normal)
         and item.initial_overlap == "refuse"
-        and not is_curved_contact(c.model.X, item)
+        and not item.curved
     )
 
 

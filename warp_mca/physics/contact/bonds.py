@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from warp_mca.system.state import State
 
 OPPOSED = -0.7  # cosine between the normals of a face and of one of the slave's around a node that it holds, at most
+LINE = 1e-3  # of the longest edge of their faces: glued nodes that spread less lie in a line
 BEYOND = 0.1  # of a face's width, by which glued nodes may lie beyond its edges, as on the chords of a coarse rim
 OFF = 1e-6  # of a face's edge, by which glued nodes may be off their place at the start: rounding
 
@@ -56,7 +57,7 @@ def places(contact: Contact, meshes: Mapping[str, Mesh], X: Mapping[str, Array])
     Bodies stand at X [m], by body, shape (node_count, 3), float64.
 
     Raises:
-        RequestError: there are none.
+        RequestError: there are none, or they lie in a line.
     """
     assert contact.bond and isinstance(contact.master, Surface)
     own, _ = meshes[contact.slave.body].surface(contact.slave.nodes)
@@ -79,6 +80,10 @@ def places(contact: Contact, meshes: Mapping[str, Mesh], X: Mapping[str, Array])
     if not glued.any():
         remedy = "no slave node lies on the master's faces at the start; let the surfaces meet, or raise gap"
         raise bad_value(f"Contact {'–'.join(contact.sides)}: Bond.gap", contact.bond.gap, remedy)
+    spread = np.linalg.svd(x[nodes[glued]] - x[nodes[glued]].mean(axis=0), compute_uv=False)
+    if len(spread) < 2 or spread[1] <= LINE * edge.max():
+        remedy = "they lie in a line, about which the bodies would turn; leave the pair in contact, or let faces meet"
+        raise bad_value(f"Contact {'–'.join(contact.sides)}: nodes that its bond holds", int(glued.sum()), remedy)
     return Place(nodes[glued], face[glued], weight[glued], edge[glued])
 
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from warp_mca.base.arrays import Array, Index
 from warp_mca.physics.contact.resting import at_rest
-from warp_mca.physics.contact.sides import is_curved
 from warp_mca.physics.contact.skin_edges import edge_eigenvalues, general_edges
 from warp_mca.physics.contact.stiffness import CURVED, FLAT, Inertia, node_mean
 from warp_mca.physics.contact.surfaces import LONGEST_LIST, surface_faces, surface_pass
@@ -35,7 +34,7 @@ def general_passes(parts: Bodies, contact: ContactAll, index: int, velocity: Arr
     skins = [surface_faces(parts, Surface(body=name, nodes="boundary")) for name in names]
     number = {name: k for k, name in enumerate(names)}
     factor = np.zeros((len(names), len(names)))
-    curved = [is_curved(skin.node, skin.normal) for skin in skins]
+    curved = [bool(skin.curved.any()) for skin in skins]
     for one, other in pairs:
         a, b = number[one], number[other]
         default = CURVED if a != b and (curved[a] or curved[b]) else 0.5 * FLAT  # two equal layers in series

@@ -34,13 +34,13 @@ class Given(NamedTuple):
 
 
 def as_settled(
-    parts: Bodies, contact: Contact, slave: Faces, master: Faces | None, velocity: Array
+    parts: Bodies, contact: Contact, slave: Faces, master: Faces | None, velocity: Array, flat: bool | None = None
 ) -> tuple[Contact, ChosenPenalty | None]:
-    """A contact with all that is left to the program, and the penalty that was chosen."""
+    """A contact with all that is left to the program, and the penalty that was chosen; `flat` as in `passes_of`."""
     soft = master is not None and _soft(parts, contact)
     contact = replace(contact, two_way=is_two_way(contact, slave, master, soft))
     contact, chosen = settled(parts, contact, slave, master, velocity)
-    return resting(parts, contact, slave, master, velocity), chosen
+    return resting(parts, contact, slave, master, velocity, flat), chosen
 
 
 def _soft(parts: Bodies, contact: Contact) -> bool:
@@ -74,8 +74,7 @@ def passes_of(
         sides = (slave, master) if item.sign > 0.0 else (master, slave)
         assert sides[0] is not None
         nodes, value = contact_eigenvalues(item, sides[0], sides[1], parts.mass)
-        decay = item.damping * float(value.max()) / item.stiffening if item.damping else 0.0
-        given.append(Given(replace(item, decay=decay), nodes, value))
+        given.append(Given(item, nodes, value))
     if master is None:
         return given
     if edges := edge_pass(parts.X, Inertia.of(parts), found[0], slave, master, contact):

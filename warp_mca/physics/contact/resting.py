@@ -27,11 +27,17 @@ if TYPE_CHECKING:
 CRITICAL = 0.5  # share of the critical damping of a slave node on its spring
 
 
-def resting(parts: Bodies, contact: Contact, slave: Faces, master: Faces | None, velocity: Array) -> Contact:
-    """The contact with its law, if that is left to the program; `velocity` of nodes [m/s], shape (node_count, 3)."""
-    if contact.law is not None or not any(parts.scene.gravity):
+def resting(
+    parts: Bodies, contact: Contact, slave: Faces, master: Faces | None, velocity: Array, flat: bool | None = None
+) -> Contact:
+    """The contact with its law, if that is left to the program; `velocity` of nodes [m/s], shape (node_count, 3).
+
+    `flat` as in `spring_stiffness`.
+    """
+    tied = contact.bond is not None and not contact.bond.fails  # nothing bounces there
+    if contact.law is not None or tied or not any(parts.scene.gravity):
         return contact
-    own, *other = spring_stiffness(replace(contact, two_way=False), slave, master)
+    own, *other = spring_stiffness(replace(contact, two_way=False), slave, master, flat)
     stiffness, bodies = own[0], [contact.slave.body]
     if isinstance(contact.master, RigidPlane):
         normal, speed = np.asarray(contact.master.normal, dtype=float), 0.0
@@ -76,7 +82,7 @@ def at_rest(
 
 def undamped(model: Model, scene: Scene) -> Model:
     """The model without the dashpots that the program added."""
-    plain = {"law": Penalty.law, "parameters": (), "damping": 0.0, "decay": 0.0}
+    plain = {"law": Penalty.law, "parameters": (), "damping": 0.0}
     passes = (replace(k, **plain) if scene.contacts[k.contact].law is None else k for k in model.passes)
     return replace(model, passes=tuple(passes))
 

@@ -129,7 +129,8 @@ def _kept(edges: SkinEdges, other: SkinEdges) -> np.ndarray:
 def _shared(first: ContactPass) -> dict[str, Any]:
     """What a pass of edges has from that of the nodes."""
     names = (
-        "mu contact law parameters stiffening friction damping face side slave_face margin longest initial_overlap sign"
+        "mu contact law parameters stiffening friction damping face side slave_face margin longest curved "
+        "initial_overlap sign"
     )
     return {name: getattr(first, name) for name in (*names.split(), "face_stiffness")}
 

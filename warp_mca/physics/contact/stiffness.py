@@ -8,7 +8,7 @@ import numpy as np
 
 from warp_mca.base.arrays import Array, Index
 from warp_mca.geometry.cell_types import is_triangle
-from warp_mca.physics.contact.sides import MAX_SIDES, find_sides, is_curved
+from warp_mca.physics.contact.sides import MAX_SIDES, find_sides
 from warp_mca.scene import Contact, RigidPlane
 
 if TYPE_CHECKING:
@@ -63,8 +63,7 @@ def flat_modulus(contact: Array, K: Array, G: Array) -> Array:
 
 def is_flat(slave: Faces, master: Faces | None) -> bool:
     """Whether no surface of a contact is curved, which decides on the default stiffness."""
-    surfaces = [slave] if master is None else [slave, master]
-    return not any(is_curved(faces.node, faces.normal) for faces in surfaces)
+    return not (slave.curved.any() or (master is not None and master.curved.any()))
 
 
 def spring_stiffness(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from warp_mca.geometry.cell_types import is_triangle
 from warp_mca.physics.contact.friction_laws import friction_values
 from warp_mca.physics.contact.sides import face_geometry, find_sides, is_curved, stiffest_fold
-from warp_mca.physics.contact.stiffness import flat_modulus, node_mean, spring_stiffness
+from warp_mca.physics.contact.stiffness import flat_modulus, is_flat, node_mean, spring_stiffness
 from warp_mca.scene import Contact, ContactAll, RigidPlane, Surface
 from warp_mca.scene.contact_laws import law_values
 from warp_mca.system.bodies import Bodies
@@ -23,7 +23,14 @@ LONGEST_LIST, ENTRIES = 4096, 2**24  # slave nodes near a face at most; more if 
 
 
 def make_faces(
-    X: Array, face: Index, element: Index, K: Array, G: Array, volume: Array, height: Array | None = None
+    X: Array,
+    face: Index,
+    element: Index,
+    K: Array,
+    G: Array,
+    volume: Array,
+    height: Array | None = None,
+    shape: Array | None = None,
 ) -> Faces:
     """Faces with the penalty stiffness K A^2 / V of Hallquist (LS-DYNA theory manual, contact, Eq. 26.6).
 
@@ -31,6 +38,7 @@ def make_faces(
         X: positions [m], shape (node_count, 3). face: shape (face_count, 4). element: of each face.
         K, G: bulk and shear modulus [Pa] and volume: [m^3] of every element, shape (element_count,).
         height: of every element over its faces, over volume by area [-], shape (element_count,); None: 1 for all.
+        shape: positions that tell whether the surface is curved [m], as `Bodies.shape`; None: X.
     """
     area, normal = face_geometry(X, face)
     K, G, volume = K[element], G[element], volume[element]
@@ -39,14 +47,16 @@ def make_faces(
     middle, across = corner.mean(axis=1), np.linalg.norm(corner[:, :, None] - corner[:, None], axis=3).max(axis=(1, 2))
     bulk, own, flat = (modulus * area**2 / volume for modulus in (K, contact, flat_modulus(contact, K, G)))
     layer = flat if height is None else flat / height[element]
-    return Faces(face, element, area, normal, middle, across, bulk, own, layer)
+    curved = is_curved(face, normal if shape is None else face_geometry(shape, face)[1])
+    return Faces(face, element, area, normal, middle, across, bulk, own, layer, np.full(len(face), curved))
 
 
 def faces_of(parts: Bodies, body: str, node: Index, element: Index) -> Faces:
     """Faces of a body, whose nodes and elements are those of its mesh."""
     node = (node + parts.node_start[body]).astype(np.int32)
     element = (element + parts.element_start[body]).astype(np.int32)
-    return make_faces(parts.X, node, element, parts.K, parts.G, parts.volume * parts.face_depth, parts.face_height)
+    volume = parts.volume * parts.face_depth
+    return make_faces(parts.X, node, element, parts.K, parts.G, volume, parts.face_height, parts.shape)
 
 
 def surface_faces(parts: Bodies, surface: Surface) -> Faces:
@@ -106,14 +116,10 @@ def surface_pass(
         face_of_node=around,
         margin=margin,
         longest=longest,
+        curved=not is_flat(slave, master),
         room=_room(slave, master, margin),
         initial_overlap=contact.initial_overlap,
     )
-
-
-def is_curved_contact(X: Array, item: ContactPass) -> bool:
-    """Whether one of the surfaces of a pass is curved; a plane is not. X: positions [m], shape (node_count, 3)."""
-    return any(is_curved(face, face_geometry(X, face)[1]) for face in (item.slave_face, item.face) if len(face))
 
 
 def contact_passes(
@@ -142,6 +148,7 @@ def contact_passes(
                 contact=index,
                 plane=contact.master,
                 deepest=deepest,
+                curved=not is_flat(slave, None),
                 initial_overlap=contact.initial_overlap,
             )
         ]
