@@ -114,6 +114,7 @@ def _build(scene: Scene, body: Body, geometry: object) -> Mesh:
     except RequestError as error:
         raise (error if geometry == body.geometry else _of_refine(scene, body, error)) from error
     validate.kind_of(f"{field}.build()", made, Mesh, "return a warp_mca.Mesh")
+    made.look_again()
     return made
 
 
