@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from warp_mca.base.errors import RequestError
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.phases.carry_out import Course, begin
 from warp_mca.phases.forecast import announce
-from warp_mca.phases.prepare import Prepared, Request, prepare
+from warp_mca.phases.prepare import Request
+from warp_mca.phases.prepare_batch import prepared
 from warp_mca.phases.stretch import rows_before
 from warp_mca.recorders.recorder import RunInfo
 from warp_mca.results.result import Result
@@ -33,7 +33,7 @@ def simulate(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | Non
     from warp_mca.recorders.frames import Recording, skins
 
     recorders, tell, clock = request.recorders, request.tell, request.clock
-    ready = _prepare(scenes, meshes, request)
+    ready = prepared(scenes, meshes, request)
     surfaces = skins(ready[0].model, ready[0].meshes) if recorders else {}
     needs: frozenset[str] = frozenset().union(*(recorder.needs for recorder in recorders))
     impact = begin(ready, request, skins=surfaces, needs=needs)
@@ -72,18 +72,3 @@ def simulate(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | Non
         found = item.result(clock.wall, said, stopped, before=rows_before(item, course.stretches))
         results.append(replace(found, failed=failed))
     return results
-
-
-def _prepare(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | None, request: Request) -> list[Prepared]:
-    """Every scene at the start of its impact phase."""
-    made: dict[object, Mesh] = {}
-    ready = []
-    for k, scene in enumerate(scenes):
-        own = replace(request, tell=lambda stage, _, k=k: request.tell(stage, k / len(scenes)))
-        try:
-            ready.append(prepare(scene, None if meshes is None else meshes[k], own, made))
-        except RequestError as error:
-            if len(scenes) == 1:
-                raise
-            raise RequestError(f"scenes[{k}]: {error}") from error
-    return ready
