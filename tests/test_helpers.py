@@ -11,7 +11,7 @@ from helper_jobs import place_of
 import warp_mca as mca
 from warp_mca.base import outside
 from warp_mca.base.helpers import Helpers, travel
-from warp_mca.phases import prepare, prepare_batch
+from warp_mca.phases import by_helpers, prepare
 from warp_mca.phases.settings import Settings
 from warp_mca.system.state import digest
 
@@ -27,19 +27,22 @@ def helpers():
 
 @pytest.fixture
 def at_once(monkeypatch):
-    """Helpers begin whatever they save; yields how many scenes they prepared."""
+    """Helpers begin whatever they save; yields which scenes they prepared, and whether they told of scenes."""
     prepared = []
-    carry_out = prepare_batch.HELPERS.carry_out
+    carry_out = by_helpers.HELPERS.carry_out
 
-    def counted(function, jobs, data, here, count, told):
+    def counted(function, jobs, data, here, count, told=None):
+        if function is by_helpers.tell_one:
+            prepared.append("told")
+            return carry_out(function, jobs, data, no_one, count)
         return carry_out(function, jobs, data, here, count, lambda k, a: (told(k, a), a[1] and prepared.append(k)))
 
     monkeypatch.setattr(outside, "_REGISTERED", [])  # by other tests
-    monkeypatch.setattr(prepare_batch, "STARTING", -1.0)
-    monkeypatch.setattr(prepare_batch, "SENDING", -1.0)
-    monkeypatch.setattr(prepare_batch.HELPERS, "carry_out", counted)
+    monkeypatch.setattr(by_helpers, "STARTING", -1.0)
+    monkeypatch.setattr(by_helpers, "SENDING", -1.0)
+    monkeypatch.setattr(by_helpers.HELPERS, "carry_out", counted)
     yield prepared
-    prepare_batch.HELPERS.end()
+    by_helpers.HELPERS.end()
 
 
 def carry_out(helpers: Helpers, count: int, here) -> list:
@@ -96,7 +99,7 @@ def test_helpers_change_no_bit_of_a_scene(at_once):
         begun: list[mca.Scene] = []
         told = lambda scene, model, meshes: begun.append(scene)  # noqa: E731
         request = prepare.Request(span=1e-5, settings=Settings("cpu", "mixed", threads), begun=told)
-        ready = prepare_batch.prepared(scenes, None, request)
+        ready = by_helpers.prepared(scenes, None, request)
         assert sorted(map(id, begun)) == sorted(map(id, scenes))
         assert all(item.scene is scene for item, scene in zip(ready, scenes, strict=True))
         parts = [(item.model, item.start, item.meshes["OA"], item.probes, item.sensors) for item in ready]
@@ -108,6 +111,25 @@ def test_helpers_change_no_bit_of_a_scene(at_once):
         found, clock = prepared(THREADS)
         assert found == alone
     assert clock.wall["rigid"] > 0.0 and clock.wall["mesh"] > 0.0 and time.perf_counter() - clock.last < 1.0
+
+
+def no_one(number: int) -> None:
+    raise AssertionError(f"helpers do not tell of scene {number}")
+
+
+def test_helpers_tell_the_same(at_once):
+    """Of boxes that pass through each other and spin."""
+    metal, box = mca.Elastic(E=2e9, nu=0.3, rho=1000.0), mca.Box(size=(0.01, 0.01, 0.01), divisions=(1, 1, 1))
+    low = mca.Body(name="low", geometry=box, material=metal, angular_velocity=(0.0, 50.0, 0.0))
+    high = mca.Body(
+        name="high", geometry=box, material=metal, position=(0.001, 0.0102, 0.0), velocity=(0.0, -30.0, 0.0)
+    )
+    scene = mca.Scene(name="pair", bodies=(low, high), impact=mca.ImpactPhase(duration=1e-4, output_interval=1e-5))
+    alone = mca.run(scene, threads=2)
+    assert any("no contact keeps" in said for said in alone.warnings) and len(alone.warnings) > 1
+    while "told" not in at_once:
+        results = mca.run_batch([scene] * (THREADS + 2), threads=THREADS)
+    assert {result.warnings for result in results} == {alone.warnings}
 
 
 def test_errors_of_a_batch_name_the_first_scene(at_once):

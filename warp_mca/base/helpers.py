@@ -78,9 +78,11 @@ class Helpers:
 
     @property
     def count(self) -> int:
-        """How many there are."""
-        self._all = [helper for helper in self._all if helper.process.poll() is None]
-        return len(self._all) if self._where == _surroundings() else 0
+        """How many wait for a job."""
+        if self._where != _surroundings():
+            return 0
+        answered = select.select(self._all, [], [], 0.0)[0]
+        return sum(helper.process.poll() is None and (helper.begun or helper in answered) for helper in self._all)
 
     def carry_out(
         self,
@@ -148,7 +150,8 @@ class Helpers:
                         told(k, found[1])
                     self._next(helper, message, left, busy)
                 except _LostError:
-                    self._lose(helper, k, left)
+                    self._lose(helper)
+                    left.extend(() if k is None else (k,))
             if left and not any(helper.begun for helper in busy):
                 k = left.popleft()
                 with suppress(Exception):  # raised at the end, if it is the first
@@ -157,8 +160,10 @@ class Helpers:
         return answers
 
     def _begin(self, count: int) -> None:
-        if self.count < len(self._all):
-            self.end()  # the folder, the places of modules or the environment are others now
+        for helper in [helper for helper in self._all if helper.process.poll() is not None]:
+            self._lose(helper)
+        if self._where != _surroundings():
+            self.end()
         self._where = _surroundings()
         with suppress(OSError, _LostError):
             while len(self._all) < count:
@@ -173,15 +178,14 @@ class Helpers:
         try:
             helper.send(message(k))
         except _LostError:
-            self._lose(helper, k, left)
+            self._lose(helper)
+            left.append(k)
         else:
             busy[helper] = k
 
-    def _lose(self, helper: _Helper, k: int | None, left: deque[int]) -> None:
+    def _lose(self, helper: _Helper) -> None:
         helper.end()
         self._all.remove(helper)
-        if k is not None:
-            left.append(k)
 
 
 def travel(data: bytes) -> bool:
@@ -201,5 +205,8 @@ class _Reader(pickle.Unpickler):
 
 
 def _surroundings() -> object:
-    """What a helper has of this process from its start on."""
-    return str(Path.cwd()), tuple(sys.path), dict(os.environ)
+    """What a helper has of this process from its start on; None where the working directory is gone."""
+    try:
+        return str(Path.cwd()), tuple(sys.path), dict(os.environ)
+    except OSError:
+        return None

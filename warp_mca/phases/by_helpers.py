@@ -1,4 +1,4 @@
-"""Owns how the scenes of a batch are brought to the start of their impact: here in turn, or side by side by helpers."""
+"""Owns what helpers do for the scenes of a batch, or this process in turn: all until the impact, and what is told."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from warp_mca.phases.meshing import made_of
 from warp_mca.phases.prepare import Prepared, Request, prepare
 from warp_mca.phases.settings import Settings
 from warp_mca.scene import Scene
+from warp_mca.watch.row import Finished
+from warp_mca.watch.table import told_at_the_end
 
 MOST_CELLS = 200_000  # of a scene for a helper: larger ones fill memory, and a batch has few of them
 STARTING = 3.0  # least work left for which helpers are started; they take a second to begin [s]
@@ -69,11 +71,8 @@ def _by_helpers(
     scenes: Sequence[Scene], made: Mapping[object, Mesh], request: Request, here: Callable[[int], Prepared]
 ) -> list[Prepared]:
     """Scenes, prepared by helpers where they know all classes of it, or `here`."""
-    try:
-        pickled = [pickle.dumps(scene, protocol=pickle.HIGHEST_PROTOCOL) for scene in scenes]
-    except Exception:  # what functions and classes of the user's own raise
-        pickled = []
-    if not pickled or not all(map(travel, pickled)):
+    pickled = _pickled(scenes)
+    if not pickled:
         return [here(k) for k in range(len(scenes))]
     wall: Wall = {}
 
@@ -93,8 +92,43 @@ def _by_helpers(
     return [replace(ready, scene=scene) for (ready, _), scene in zip(answers, scenes, strict=True)]
 
 
+def _pickled(scenes: Sequence[Scene]) -> list[bytes]:
+    """Scenes for helpers; none where they do not know all classes of them."""
+    try:
+        found = [pickle.dumps(scene, protocol=pickle.HIGHEST_PROTOCOL) for scene in scenes]
+    except Exception:  # what functions and classes of the user's own raise
+        return []
+    return found if all(map(travel, found)) else []
+
+
 def prepare_one(scene: bytes, made: dict[object, Mesh], span: float, settings: Settings) -> Answer:
     """What a helper does: a pickled scene at the start of its impact phase, and wall time by stage [s]."""
     request = Request(span=span, settings=settings)
     with unchanged():
         return prepare(pickle.loads(scene), None, request, made), request.clock.wall
+
+
+def told(finished: Sequence[Finished], before: Sequence[Sequence[str]], threads: int) -> list[tuple[str, ...]]:
+    """What each scene of a batch says of itself, as `told_at_the_end`, by helpers where they are there.
+
+    Args:
+        finished: the scenes.
+        before: what was told of each before.
+        threads: of the run.
+    """
+
+    def here(k: int) -> tuple[str, ...]:
+        return told_at_the_end(finished[k], before[k])
+
+    wanted = len(finished) > threads > 2 and HELPERS.count >= threads and not registered()
+    if not wanted or not _pickled([item.scene for item in finished]):
+        return [here(k) for k in range(len(finished))]
+    return HELPERS.carry_out(
+        tell_one, len(finished), lambda k: pickle.dumps((finished[k], before[k]), protocol=5), here, threads
+    )
+
+
+def tell_one(finished: Finished, before: Sequence[str]) -> tuple[str, ...]:
+    """What a helper does: all that a scene says of itself."""
+    with unchanged():
+        return told_at_the_end(finished, before)
