@@ -72,7 +72,7 @@ def finished(scene: mca.Scene, **settings) -> Impact:
 
 def result_of(impact: Impact, index: int = 0) -> mca.Result:
     """What came of a scene."""
-    return impact.scene_runs[index].result(Clock().wall, (), impact.stopped[index])
+    return impact.scene_runs[index].result(Clock().wall, stopped=impact.stopped[index])
 
 
 def momentum(impact: Impact, first: int = 0, end: int | None = None) -> NDArray[np.float64]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import warp_mca as mca
-from warp_mca.base.kept import Kept
+from warp_mca.base.kept import Kept, unchanged
 from warp_mca.geometry.parts import Part, Parts
 from warp_mca.model.build import build_model
 from warp_mca.phases.meshing import mesh
@@ -61,6 +61,36 @@ def test_nodes_of_a_given_mesh_may_be_moved_between_runs():
     own.points[:, 0] *= -1.0
     with pytest.raises(mca.RequestError, match="inverted"):
         mesh(scene, {})
+
+
+def test_a_run_compares_a_mesh_once():
+    """Between runs, and where a recipe of the user's own changes its mesh after a look, each change is seen."""
+    own = mca.Box(size=(1.0, 1.0, 1.0), divisions=(2, 2, 2)).build()
+    with unchanged():
+        first = own.known
+        with unchanged():
+            own.cell_volumes.sum()
+            own.points[:, 0] *= 2.0  # which nobody may do here, or it would cost a look each time
+            assert own.known is first
+    assert own.cell_volumes.sum() == pytest.approx(2.0)
+
+    class Stretched:
+        def build(self) -> mca.Mesh:
+            made = mca.Box(size=(1.0, 1.0, 1.0), divisions=(2, 2, 2)).build()
+            made.points[:, 0] *= 3.0 / made.cell_volumes.sum()
+            return made
+
+    with unchanged():
+        assert mesh(alone(Stretched()), {})["it"].cell_volumes.sum() == pytest.approx(3.0)
+
+
+def test_a_run_sees_what_changed_since_the_one_before():
+    own = mca.Box(size=(1.0, 1.0, 1.0), divisions=(2, 2, 2)).build()
+    scene, masses = alone(own), []
+    for _ in range(2):
+        masses.append(mca.run(scene, duration=1e-6).summary["bodies"]["it"]["mass"])
+        own.points[:, 0] *= 2.0
+    assert masses[1] == pytest.approx(2.0 * masses[0])
 
 
 def test_what_depends_on_more_than_numbers_is_meshed_for_each_run(tmp_path):

@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import Any, NamedTuple, TypeVar
 
 from warp_mca.base.errors import bad_value
+from warp_mca.base.outside import note_registered
 from warp_mca.base.validate import brief
 
 Thing = TypeVar("Thing")
@@ -122,6 +123,7 @@ def register(thing: Thing, *, kind: str | None = None) -> Thing:
         remedy = f"{_words(other)} has this name; give {_words(thing)} another one"
         raise bad_value(f"register: name of the {found[0]}", name, remedy)
     entries[name] = thing
+    note_registered(name)
     return thing
 
 

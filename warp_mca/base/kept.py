@@ -3,10 +3,28 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Generic, TypeVar
 
 T = TypeVar("T")
+_RUN: ContextVar[object | None] = ContextVar("run", default=None)
+
+
+@contextmanager
+def unchanged() -> Iterator[None]:
+    """While this thread is in it, arrays stay as they are: whether they changed is looked at once."""
+    token = _RUN.set(this_run() or object())
+    try:
+        yield
+    finally:
+        _RUN.reset(token)
+
+
+def this_run() -> object | None:
+    """What tells one time in `unchanged` from another; None outside."""
+    return _RUN.get()
 
 
 class Kept(Generic[T]):

@@ -1,4 +1,4 @@
-"""Owns modules of the user's own that commands import by name: `--import MODULE`, `--recorder MODULE:NAME`."""
+"""Owns what this process has of the user's own: modules imported by name (`--import MODULE`), registered kinds."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from warp_mca.base.errors import bad_value
 from warp_mca.base.validate import call
 
 _IMPORTED: dict[str, str] = {}  # folder that each module was looked for in, by its name
+_REGISTERED: list[str] = []  # names of kinds, in turn
 
 
 def import_named(field: str, name: str, folder: str | None = None) -> ModuleType:
@@ -43,6 +44,16 @@ def import_named(field: str, name: str, folder: str | None = None) -> ModuleType
 def imported() -> dict[str, str]:
     """Modules imported so far by `import_named`, with their folders: another process must import them, too."""
     return dict(_IMPORTED)
+
+
+def note_registered(name: str) -> None:
+    """Tables of this process have a kind of this name that another process does not."""
+    _REGISTERED.append(name)
+
+
+def registered() -> bool:
+    """Whether they have any."""
+    return bool(_REGISTERED)
 
 
 def file_of(module: ModuleType) -> Path | None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
+from warp_mca.base.kept import this_run
 from warp_mca.geometry.boundary import boundary_faces
 from warp_mca.geometry.cell_types import stored_types
 from warp_mca.geometry.integrals import gauss_jacobians
@@ -104,12 +105,20 @@ class Mesh:
 
     @property
     def known(self) -> dict[Hashable, Any]:
-        """What was computed of its nodes and cells as they are: empty where one of them was changed since."""
-        state = tuple(hash(values.tobytes()) for values in (self.points, *self.cells.values()))
-        before, found = vars(self).get("_known", (None, {}))
-        if before != state:
-            vars(self)["_known"] = state, (found := {})
+        """What was computed of its nodes and cells as they are: empty where one of them was changed since.
+
+        They are compared at each look, in a run at the first one.
+        """
+        state, found, seen = vars(self).get("_known", (None, {}, None))
+        if seen is None or seen is not this_run():
+            now = tuple(hash(values.tobytes()) for values in (self.points, *self.cells.values()))
+            vars(self)["_known"] = now, (found := found if now == state else {}), this_run()
         return found
+
+    def look_again(self) -> None:
+        """Compare nodes and cells at the next look, in a run too: code of the user's own had the mesh."""
+        if "_known" in vars(self):
+            vars(self)["_known"] = *vars(self)["_known"][:2], None
 
     def with_ratio(self, ratio: Array) -> Mesh:
         """The mesh with another `volume_ratio`, and with what is known of it."""

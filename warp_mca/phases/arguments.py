@@ -9,6 +9,7 @@ from typing import ParamSpec, TypeVar
 
 from warp_mca.base import validate
 from warp_mca.base.errors import bad_value
+from warp_mca.base.kept import unchanged
 from warp_mca.base.progress import progress_bar
 from warp_mca.recorders.recorder import Recorder
 from warp_mca.scene import Scene
@@ -22,11 +23,11 @@ _RUNNING = threading.RLock()  # Warp captures graphs for the whole process: one 
 
 
 def one_at_a_time(run: Callable[P, T]) -> Callable[P, T]:
-    """`run`, which waits until no other thread is in a function that was made by this."""
+    """`run`, which waits until no other thread is in a function that was made by this; meshes stay as they are."""
 
     @wraps(run)
     def wait_and_run(*args: P.args, **kwargs: P.kwargs) -> T:
-        with _RUNNING:
+        with _RUNNING, unchanged():
             return run(*args, **kwargs)
 
     return wait_and_run

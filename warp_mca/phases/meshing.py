@@ -76,6 +76,12 @@ def mesh(
     return cut
 
 
+def made_of(scene: Scene, made: Mapping[object, Mesh]) -> dict[object, Mesh]:
+    """Those of the meshes by recipe that a scene's bodies have."""
+    keys = {_key(_geometry(scene, body)) for body in scene.bodies}
+    return {key: made[key] for key in keys if key in made and not isinstance(key, _Itself)}
+
+
 def _check_set(field: str, body: str, name: str, mesh: Mesh, covers: bool) -> None:
     """Refuse a node set that the mesh of a body does not have, or that does not cover faces where it must.
 
@@ -114,6 +120,7 @@ def _build(scene: Scene, body: Body, geometry: object) -> Mesh:
     except RequestError as error:
         raise (error if geometry == body.geometry else _of_refine(scene, body, error)) from error
     validate.kind_of(f"{field}.build()", made, Mesh, "return a warp_mca.Mesh")
+    made.look_again()
     return made
 
 

@@ -73,6 +73,13 @@ class Clock:
         self.wall[stage] += now - self.last
         self.last = now
 
+    def share(self, stages: Mapping[str, float]) -> None:
+        """Count the time since the last lap to stages in proportion to these numbers."""
+        now, whole = time.perf_counter(), sum(stages.values())
+        for stage, part in stages.items():
+            self.wall[stage] += (now - self.last) * part / whole
+        self.last = now
+
 
 @dataclass(frozen=True, kw_only=True)
 class Request:

@@ -19,16 +19,17 @@ from warp_mca.results.result import Result, summarise
 from warp_mca.results.sensor_history import sensor_figures
 from warp_mca.scene.contacts import contact_names
 from warp_mca.step.state_figures import (
-    at_last_record,
     flexible_bodies,
     joint_impulses,
     max_normal_force,
     max_penetration,
     max_plastic_strain,
     max_speed,
+    motion_at_the_end,
     rigid_bodies,
     rigid_extremes,
 )
+from warp_mca.system.reading import on_host
 from warp_mca.watch.energy import spring_shares
 from warp_mca.watch.failure_report import failure_report
 from warp_mca.watch.ledger import Ledger
@@ -112,20 +113,20 @@ class SceneRun:
         facts = phase_facts("impact", start, end, "duration", self.ledger.energy())
         return rows_of(self.ready, self.ledger, facts, origin=origin)
 
-    def result(
-        self,
-        wall: Mapping[str, float],
-        said: Sequence[str] = (),
-        stopped: str | None = None,
-        *,
-        before: Sequence[Rows] = (),
-        origin: float = 0.0,
-    ) -> Result:
-        """What came of it; figures of the summary are those of the impact, but for probes and sections after a swing.
+    def result(self, wall: Mapping[str, float], **more: Any) -> Result:
+        """What came of it, with what it says of itself; arguments as in `outcome`."""
+        found, finished = self.outcome(wall, **more)
+        return replace(found, warnings=told_at_the_end(finished, self.ready.warnings))
+
+    def outcome(
+        self, wall: Mapping[str, float], stopped: str | None = None, *, before: Sequence[Rows] = (), origin: float = 0.0
+    ) -> tuple[Result, Finished]:
+        """What came of it, without warnings, and what these depend on.
+
+        Figures of the summary are those of the impact, but for probes and sections after a swing.
 
         Args:
             wall: seconds by stage.
-            said: what recorders said.
             stopped: why a guard stopped it.
             before: rows of the phases before it.
             origin: times count from then on [s], after the first row of the impact.
@@ -135,14 +136,14 @@ class SceneRun:
         summary = summarise(own.history, self._facts(wall, shares), own.contacts)
         summary |= self._rigid_facts(own.history, stopped is not None)
         facts = {"history": own.history, "contacts": own.contacts, "shares": shares, "peaks": summary["bodies"]}
-        told = self._told(stopped is not None, origin=origin, **facts)
+        finished = self._finished(stopped is not None, origin=origin, **facts)
         found = joined(ready.scene, ready.probes, [*before, own])
         last = slice(-len(own.history["time_s"]) if ready.scene.phases else 0, None)
         seen, cut = ([item.at(last) for item in found[name]] for name in ("probes", "sections"))
         summary |= sensor_figures(seen, cut, {name: column[last] for name, column in found["history"].items()})
         if before:
             summary["phases"] = [part.facts for part in (*before, own)]
-        return Result(summary=summary, warnings=(*told, *said), stopped=stopped, **found)
+        return Result(summary=summary, warnings=(), stopped=stopped, **found), finished
 
     @property
     def _context(self) -> Context:
@@ -166,8 +167,7 @@ class SceneRun:
         model, scene, found = self.ready.model, self.ready.scene, {}
         if not scene.rigid_names:
             return found
-        fields = (self.state.u.numpy(), self.state.v.numpy()) if stopped else at_last_record(self.solver, self.state)
-        u, v = (np.asarray(field[self.looks.nodes], dtype=np.float64) for field in fields)
+        u, v = motion_at_the_end(self.solver, self.state, self.looks.nodes, stopped)
         found["rigid_bodies"] = rigid_bodies(model, u, v)
         if model.body_joints:
             found["joints"] = joint_reports(self.solver, self.index, history)
@@ -274,14 +274,14 @@ class SceneRun:
             "energy_error": self.ledger.kept.energy_error,
         }
 
-    def _told(self, stopped: bool, **found: Any) -> tuple[str, ...]:
-        """What the run says of itself; arguments are fields of `Finished`."""
+    def _finished(self, stopped: bool, **found: Any) -> Finished:
+        """What warnings depend on; arguments are fields of it."""
         ready, nodes = self.ready, self.looks.nodes
-        u, v = (np.asarray(field.numpy(), dtype=np.float64) for field in (self.state.u, self.state.v))
+        u, v = (np.asarray(on_host(field), dtype=np.float64) for field in (self.state.u, self.state.v))
         model = ready.model
         if model.fails and len(self.solver.contacts) == len(model.passes):  # as surfaces are by then
             model = replace(model, passes=tuple(stage.items[0] for stage in self.solver.contacts))
-        finished = Finished(
+        return Finished(
             scene=ready.scene,
             meshes=ready.meshes,
             model=model,
@@ -297,4 +297,3 @@ class SceneRun:
             rigid=rigid_extremes(self.solver, self.state, self.index),
             **found,
         )
-        return told_at_the_end(finished, ready.warnings)

@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from warp_mca.base.errors import RequestError
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.phases.by_helpers import prepared, told
 from warp_mca.phases.carry_out import Course, begin
 from warp_mca.phases.forecast import announce
-from warp_mca.phases.prepare import Prepared, Request, prepare
+from warp_mca.phases.prepare import Request
 from warp_mca.phases.stretch import rows_before
 from warp_mca.recorders.recorder import RunInfo
 from warp_mca.results.result import Result
 from warp_mca.scene import Scene
+from warp_mca.system.reading import read_once
 
 
 def simulate(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | None, request: Request) -> list[Result]:
@@ -33,7 +34,7 @@ def simulate(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | Non
     from warp_mca.recorders.frames import Recording, skins
 
     recorders, tell, clock = request.recorders, request.tell, request.clock
-    ready = _prepare(scenes, meshes, request)
+    ready = prepared(scenes, meshes, request)
     surfaces = skins(ready[0].model, ready[0].meshes) if recorders else {}
     needs: frozenset[str] = frozenset().union(*(recorder.needs for recorder in recorders))
     impact = begin(ready, request, skins=surfaces, needs=needs)
@@ -49,7 +50,7 @@ def simulate(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | Non
     def opening() -> None:  # recorders see the impact
         impact.recording = recording
 
-    def told() -> None:
+    def seen() -> None:
         nonlocal passed
         if impact.recording and impact.rows > passed:
             first, passed = passed, impact.rows
@@ -58,7 +59,7 @@ def simulate(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | Non
 
     course, done = Course(impact, request), False
     try:
-        course.run(lone.scene.phases, told, tell=lambda share: tell("impact", share), opening=opening)
+        course.run(lone.scene.phases, seen, tell=lambda share: tell("impact", share), opening=opening)
         done = True
     finally:
         clock.lap("fe")
@@ -67,23 +68,12 @@ def simulate(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | Non
             clock.lap("output")
     failed = tuple(recording.failed) if recording else ()
     tell("impact", 1.0)
-    results = []
-    for item, stopped in zip(impact.scene_runs, impact.stopped, strict=True):
-        found = item.result(clock.wall, said, stopped, before=rows_before(item, course.stretches))
-        results.append(replace(found, failed=failed))
-    return results
-
-
-def _prepare(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | None, request: Request) -> list[Prepared]:
-    """Every scene at the start of its impact phase."""
-    made: dict[object, Mesh] = {}
-    ready = []
-    for k, scene in enumerate(scenes):
-        own = replace(request, tell=lambda stage, _, k=k: request.tell(stage, k / len(scenes)))
-        try:
-            ready.append(prepare(scene, None if meshes is None else meshes[k], own, made))
-        except RequestError as error:
-            if len(scenes) == 1:
-                raise
-            raise RequestError(f"scenes[{k}]: {error}") from error
-    return ready
+    with read_once():
+        ended = [
+            item.outcome(clock.wall, stopped, before=rows_before(item, course.stretches))
+            for item, stopped in zip(impact.scene_runs, impact.stopped, strict=True)
+        ]
+    warnings = told([finished for _, finished in ended], [item.warnings for item in ready], request.settings.threads)
+    return [
+        replace(result, warnings=(*own, *said), failed=failed) for (result, _), own in zip(ended, warnings, strict=True)
+    ]

@@ -10,6 +10,7 @@ import numpy as np
 
 from warp_mca.base.arrays import Array
 from warp_mca.base.rotation import mean_pose, rotation_vector
+from warp_mca.system.reading import on_host
 from warp_mca.system.rigid import RigidExtremes
 
 if TYPE_CHECKING:
@@ -38,18 +39,25 @@ def max_normal_force(solver: Solver, state: State, scene: int = 0) -> float:
 def max_speed(solver: Solver, state: State, scene: int = 0) -> float:
     """Greatest speed of any node of a scene, from the start on [m/s]."""
     first, end = solver.layout.nodes[scene : scene + 2]
-    squares = state.speed_square.numpy()
+    squares = on_host(state.speed_square)
     return math.sqrt(squares[first:end].max() if len(squares) > 1 else squares[0])
 
 
-def at_last_record(solver: Solver, state: State) -> tuple[Array, Array]:
-    """Displacements [m] and velocities [m/s] of the nodes at the last record, each shape (node_count, 3), float64.
+def at_last_record(solver: Solver, state: State, nodes: slice = slice(None)) -> tuple[Array, Array]:
+    """Displacements [m] and velocities [m/s] of nodes at the last record, each shape (node_count, 3), float64.
 
     A record is followed by a step, which is taken back; the velocity is the mean of both half steps around the record.
     """
     u, after, dt = solver.nodes.at_record(state)
-    v = after.numpy()
-    return u.numpy() - dt * v, 0.5 * (solver.work.v_before.numpy() + v)
+    v = on_host(after)[nodes]
+    return on_host(u)[nodes] - dt * v, 0.5 * (on_host(solver.work.v_before)[nodes] + v)
+
+
+def motion_at_the_end(solver: Solver, state: State, nodes: slice, stopped: bool) -> tuple[Array, Array]:
+    """As `at_last_record`, but as they are where a guard stopped the run."""
+    fields = (on_host(state.u)[nodes], on_host(state.v)[nodes]) if stopped else at_last_record(solver, state, nodes)
+    u, v = (np.asarray(field, dtype=np.float64) for field in fields)
+    return u, v
 
 
 def rigid_bodies(model: Model, u: Array, v: Array) -> dict[str, dict[str, object]]:
@@ -118,7 +126,7 @@ def joint_impulses(solver: Solver, state: State, scene: int = 0) -> dict[str, li
 
     That of joints between whole bodies is the one up to the last record, others are half a step ahead.
     """
-    impulse = state.constraints.impulse.numpy()
+    impulse = on_host(state.constraints.impulse)
     joints = solver.model.joints[solver.layout.joints[scene] : solver.layout.joints[scene + 1]]
     found = {joint.name: impulse[joint.start : joint.end].sum(axis=0).tolist() for joint in joints}
     if (whole := solver.model.body_joints) and solver.rigid.joints:

@@ -8,6 +8,7 @@ import numpy as np
 
 from warp_mca.geometry.quality import volumes
 from warp_mca.physics.elements.cells import densities
+from warp_mca.system.reading import on_host
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -56,10 +57,10 @@ def _failed(solver: Solver, state: State, index: int) -> tuple[Index, Index, Arr
         own = state.elements[stage.index].failing
         if own is None:
             continue
-        age = own.age.numpy()[first - stage.block.first : end - stage.block.first]
+        age = on_host(own.age)[first - stage.block.first : end - stage.block.first]
         mine = np.flatnonzero(age < 0)
         corners = stage.block.conn[:, mine + first - stage.block.first]
-        u = own.u.numpy().reshape(*stage.block.conn.shape, 3)[:, mine + first - stage.block.first]
+        u = on_host(own.u).reshape(*stage.block.conn.shape, 3)[:, mine + first - stage.block.first]
         element.append(model.element_of[mine + first])
         steps.append(-1 - age[mine])
         place.append((model.X[corners] + u).mean(axis=0))

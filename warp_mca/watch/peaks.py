@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warp_mca.kernels.records.extremes import PLASTIC_STRAIN, VON_MISES
+from warp_mca.system.reading import on_host
 
 if TYPE_CHECKING:
     from warp_mca.base.arrays import Array, Index
@@ -74,7 +75,7 @@ def _of_blocks(
     for stage, (first, end) in zip(solver.elements, solver.layout.elements[index].tolist(), strict=True):
         element = model.element_of[first:end]
         own = np.flatnonzero((element >= start) & (element < start + mesh.cell_count)) + first - stage.block.first
-        peak: Array = state.elements[stage.index].peak.numpy()
+        peak: Array = on_host(state.elements[stage.index].peak)
         if len(own) and row < len(peak):
             k = own[np.argmax(peak[row, own])]
             yield float(peak[row, k]), int(peak[row + 1, k]), stage.block.conn[:, k]

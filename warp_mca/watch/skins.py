@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -63,6 +64,11 @@ class Skin:
         self.x, self._stale = self.X, False
         some = slice(None, None, -(-len(normal) // RAYS))
         self.thickness, self.gap = self._distances(((a + b + c) / 3.0)[some], normal[some])
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For another process, without what Warp has of it, which is made anew where it is looked at."""
+        own = {name: value for name, value in vars(self).items() if not isinstance(value, wp.Mesh | wp.array)}
+        return own | {"_stale": True}
 
     @cached_property
     def _mesh(self) -> wp.Mesh:

@@ -15,6 +15,7 @@ from warp_mca.kernels.records.absorbing import sum_absorbed
 from warp_mca.physics.elements.stage import BLOCK_DIM
 from warp_mca.system.actor import Actor, When
 from warp_mca.system.columns import added_columns
+from warp_mca.system.reading import on_host
 from warp_mca.system.stage import BESIDE, Stage, Step
 
 if TYPE_CHECKING:
@@ -127,7 +128,7 @@ class AbsorbingStage(Actor):
         names = [name for name in self.model.node_start if self.layout.count == 1 or name.startswith(f"{scene}/")]
         starts = [self.model.node_start[name] for name in names]
         bounds = np.searchsorted(self.model.absorbing.node, [*starts, self.layout.nodes[scene + 1]])
-        impulse = state.absorbing.impulse.numpy()
+        impulse = on_host(state.absorbing.impulse)
         spans = zip(names, bounds[:-1], bounds[1:], strict=True)
         own = {name: impulse[first:end].sum(axis=0).tolist() for name, first, end in spans if end > first}
         return own if self.layout.count == 1 else {name.split("/", 1)[1]: value for name, value in own.items()}

@@ -20,6 +20,7 @@ from warp_mca.physics.contact.friction_laws import node_areas
 from warp_mca.physics.contact.sides import face_geometry, find_sides
 from warp_mca.scene import Contact, Surface
 from warp_mca.system.contact import BondedNodes
+from warp_mca.system.reading import on_host
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
@@ -197,7 +198,7 @@ def bond_reports(stages: Sequence[ContactStage], state: State, scene: int, X: Ar
 def _report(stage: ContactStage, state: State, scene: int, X: Array) -> dict[str, object]:
     spring, item = state.contacts[stage.index].spring, stage.items[scene]
     mine = slice(int(stage.springs[scene]), int(stage.springs[scene + 1]))
-    holds, time = spring.bond.numpy()[mine], spring.bond_time.numpy()[mine]
+    holds, time = on_host(spring.bond)[mine], on_host(spring.bond_time)[mine]
     failed = np.flatnonzero(holds < 0)
     found: dict[str, object] = {"nodes": int((holds != 0).sum()), "failed": len(failed)}
     if not len(failed):

@@ -9,6 +9,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.system.contact import ContactPass
+from warp_mca.system.reading import on_host
 from warp_mca.system.threads import RANGES
 
 _BITS = 60  # of the whole numbers, below their sign, that springs as deep as their faces are long would fill
@@ -40,7 +41,7 @@ class NormalForce:
 
     def greatest(self, sums: wp.array, scene: int) -> float:
         """Greatest normal force of a scene in any step [N]; 0 without contact."""
-        return float(sums.numpy()[0, scene]) / self._scales[scene] if self._scales else 0.0
+        return float(on_host(sums)[0, scene]) / self._scales[scene] if self._scales else 0.0
 
 
 def _scale(passes: Sequence[ContactPass]) -> float:

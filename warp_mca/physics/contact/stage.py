@@ -21,6 +21,7 @@ from warp_mca.physics.contact.friction_laws import friction_rows
 from warp_mca.physics.contact.per_scene import device_pairs, numbers, per_scene, vectors
 from warp_mca.physics.contact.slave_edges import SlaveEdges, faces_of_slaves, new_springs
 from warp_mca.system.contact import LIST_LENGTH, SLOTS, ContactPass
+from warp_mca.system.reading import on_host
 from warp_mca.system.threads import CONTACT, Split, whole
 
 if TYPE_CHECKING:
@@ -296,5 +297,5 @@ class ContactStage:
 
     def depths(self, state: State, scene: int) -> NDArray[np.float64]:
         """Largest penetration so far of each spring of a scene [m], those of slave 0 first, shape (spring_count,)."""
-        depth = state.contacts[self.index].spring.depth.numpy()
+        depth = on_host(state.contacts[self.index].spring.depth)
         return depth[self.springs[scene] : self.springs[scene + 1]]
