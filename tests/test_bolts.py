@@ -142,6 +142,30 @@ def test_the_impact_begins_with_its_preload(device: str):
     assert result.summary["energy_error"] < 1e-2
 
 
+def test_plates_that_ring_in_time_with_the_looks_rest():
+    """What is left of this motion turns back every ten steps, when all stands still: it was never damped, and stopped.
+
+    Weight and a warm plate leave the joint with the force of its screw, and nothing rings: there is no warning.
+    """
+    plate = mca.Box(size=(0.04, 0.04, 0.01), divisions=(8, 8, 2), origin=(-0.02, -0.02, -0.01))
+    lower = mca.Body(name="base", geometry=plate, material=STEEL)
+    screw = replace(SCREW, diameter=6e-3, other_at=(0.0, 0.0, -0.01), preload=5000.0)
+    made = clamped(
+        bodies=(lower, replace(lower, name="lid", position=(0.0, 0.0, 0.01))),
+        contacts=(replace(PRESSED, slave=mca.Surface(body="lid", nodes="zmin")),),
+        fixed=(mca.Fixed(body="base", nodes="zmin"),),
+        loads=(screw,),
+        phases=(mca.Settle(duration=1e-3),),
+    )
+    warm = mca.ThermalStrain(body="lid", expansion=1.2e-5, temperature=10.0)
+    for scene in (made, replace(made, loads=(screw, warm), gravity=(0.0, 0.0, -9.81))):
+        result = mca.run(scene, device="cpu")
+        impact = result.time >= 0.0
+        assert result["bolt_screw_N"][impact] == pytest.approx(5000.0, rel=1e-3)
+        assert result.contacts[0].pressure[impact] == pytest.approx(5000.0, rel=5e-3)
+        assert not [text for text in result.warnings if "still in progress" not in text]
+
+
 def test_its_preload_is_back_after_an_impact():
     """A ball's blow opens and shears the joint; damped, the screw pulls as before within 1 %; parts that fall, too."""
     falling = tuple(replace(body, velocity=(0.0, 0.0, -2.0)) for body in (PLATE, LID))

@@ -16,7 +16,7 @@ def without_limit(scene: Scene) -> Mapping[str, str]:
     A force at a point or along a line gives displacements that grow without bound as cells shrink, as 1/h and ln 1/h
     (Kelvin's and Flamant's solutions), and plastic strain with them.
     """
-    for joint in scene.joints:
+    for joint in scene.acting_joints:
         if isinstance(joint, Revolute) and joint.nodes != "pin":
             what = "two nodes" if joint.nodes == "ends" else "the nodes of its axis"
             load = "a point load" if joint.nodes == "ends" else "a line load"

@@ -22,7 +22,7 @@ class Controls:
         rates: dict[int, list[int]] = {}
         self._controllers: dict[int, Controller] = {}
         first = 0
-        for whole in filter(None, (joint.whole() for joint in scene.joints)):
+        for whole in filter(None, (joint.whole() for joint in scene.acting_joints)):
             for freedom in whole.freedoms:
                 if isinstance(freedom.motor, Controller):
                     self._controllers[id(freedom.motor)] = freedom.motor

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 STEPS = 10  # between two looks at the kinetic energy at most, until it was at its greatest
+SHORT = 0.7  # share of that between every second two: looks half a period apart would always see a motion turn back
 LOOKS = 8  # at least until then, and in each quarter of the period of what moves later
 LENGTHS = (1, 2, 5, STEPS)  # of what is advanced at once: a graph of launches is captured for each other number
 ROWS = 500  # of the history, where it lasts as long as it may
@@ -54,7 +55,7 @@ def settle(phase: Settle, impact: Impact, tell: Callable[[float], None]) -> Stre
     motion.fall()
     greatest = kinetic = 0.0
     quiet = reached = quarter = 0  # steps, the last one of a quarter of the period of what moves
-    passed = False
+    passed = short = False
     while quiet <= max(reached, quarter) or state.steps * fine.dt < motion.rise:
         if state.steps >= steps.count - STEPS:
             raise GuardError(
@@ -62,11 +63,9 @@ def settle(phase: Settle, impact: Impact, tell: Callable[[float], None]) -> Stre
                 f"{kinetic / greatest:.2g} of its greatest value; give a longer duration, or hold what falls"
             )
         wanted = max(1, min(STEPS, state.steps // LOOKS), quarter // LOOKS)
-        wanted = min(wanted, steps.count - STEPS - state.steps)
-        length = max(length for length in LENGTHS if length <= wanted)
-        stride = wanted - wanted % length
-        for _ in range(stride // length):
-            impact.advance(until=state.steps + length)
+        wanted, short = max(1, int(SHORT * wanted)) if short else wanted, not short
+        stride = min(wanted, steps.count - STEPS - state.steps)
+        _advance(impact, stride)
         tell(state.steps / steps.count)
         kinetic = motion.look()
         if kinetic > greatest:
@@ -82,3 +81,10 @@ def settle(phase: Settle, impact: Impact, tell: Callable[[float], None]) -> Stre
     stretch = stretch_ended(impact, "settle", "rest", fine)
     motion.release(impact.scene_runs[0])
     return stretch
+
+
+def _advance(impact: Impact, stride: int) -> None:
+    """Take so many steps."""
+    end = impact.state.steps + stride
+    while (left := end - impact.state.steps) > 0:
+        impact.advance(until=impact.state.steps + max(length for length in LENGTHS if length <= left))

@@ -147,7 +147,7 @@ def check_whole(scene: Scene) -> None:
             body = getattr(getattr(contact, name), "body", None)
             if body in bare:
                 raise bad_value(f"Contact.{name}.body", body, "it is a mass without surface; give it a geometry")
-    for joint in scene.joints:
+    for joint in scene.acting_joints:
         whole = joint.whole()
         if whole is None:
             continue
@@ -183,7 +183,7 @@ def _check_coupler(scene: Scene, joint: Joint, freedom: Freedom) -> None:
     """
     coupler = freedom.follows
     assert coupler is not None
-    freedoms = {item.name: whole.freedoms for item in scene.joints if (whole := item.whole()) is not None}
+    freedoms = {item.name: whole.freedoms for item in scene.acting_joints if (whole := item.whole()) is not None}
     if coupler.joint not in freedoms:
         known = ", ".join(sorted(freedoms))
         raise bad_value("Coupler.joint", coupler.joint, f"joints between whole bodies are {known}; name one of them")

@@ -154,7 +154,7 @@ def _names(scene: Scene, figure: str) -> list[str]:
         "probes": [probe.name for probe in scene.probes if probe.cfc is not None or not filtered],
         "sections": [section.name for section in scene.sections],
         "contacts_by_pair": names,
-        "joints": [joint.name for joint in scene.joints if joint.whole() is not None],
+        "joints": [joint.name for joint in scene.acting_joints if joint.whole() is not None],
         "bolts": [load.name for load in scene.loads if isinstance(load, Bolt)],
         "springs": [load.name for load in scene.loads if isinstance(load, Spring)],
         "bonds": [name for name, own in zip(names, scene.contacts, strict=True) if getattr(own, "bond", None)],

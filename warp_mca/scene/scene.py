@@ -144,7 +144,6 @@ class Scene:
         for field_name, body in self._named_bodies():
             if body not in names:
                 raise bad_value(field_name, body, f"the scene's bodies are {', '.join(names)}")
-        object.__setattr__(self, "joints", without_shared_nodes(self))
         check_whole(self)
         check_bolts(self)
         if self.general and not self.general_pairs():
@@ -222,11 +221,16 @@ class Scene:
             (f"{type(item).__name__}.nodes", item.body, item.nodes, isinstance(item, Absorbing)) for item in self._held
         ]
         named += [(f"{type(load).__name__}.{key}", *own) for load in self.loads for key, own in load.sets().items()]
-        for joint in self.joints:
+        for joint in self.acting_joints:
             named += [(f"{joint.title}.{key}", *own, False) for key, own in joint.sets().items()]
         named += [(f"{field}.nodes", surface.body, surface.nodes, True) for field, surface in self._surfaces()]
         points = (*self.probes, *self.masses)
         return named + [(f"{p.title}.nodes", p.body, p.nodes, False) for p in points if p.nodes is not None]
+
+    @property
+    def acting_joints(self) -> tuple[Joint, ...]:
+        """The joints as a run takes them: pins and balls of rigid bodies whose nodes would be the same take none."""
+        return without_shared_nodes(self)
 
     @property
     def listed(self) -> tuple[Contact, ...]:

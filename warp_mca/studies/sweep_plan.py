@@ -162,7 +162,7 @@ def _limit(scene: Scene, device: str, meshes: Mapping[str, Mesh] | None) -> int:
 
 def _step_key(scene: Scene, options: RunOptions, number: int) -> object:
     """Equal for scenes that may share a batch: those of one duration, step, and kind of contacts."""
-    whole = [(joint.name, found) for joint in scene.joints if (found := joint.whole())]
+    whole = [(joint.name, found) for joint in scene.acting_joints if (found := joint.whole())]
     asked = any(isinstance(freedom.motor, Controller) for _, joint in whole for freedom in joint.freedoms)
     if scene.t_end is not None or options.multi_rate is not None or asked:
         return number

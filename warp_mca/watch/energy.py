@@ -11,7 +11,7 @@ import numpy as np
 from warp_mca.base.arrays import Array
 from warp_mca.kernels.records.columns import PRESSURE, SPRING_ENERGY
 from warp_mca.physics.elements import ELEMENTS
-from warp_mca.scene import Contact, ContactAll, Settle, ThermalStrain
+from warp_mca.scene import Bolt, Contact, ContactAll, Settle, ThermalStrain
 from warp_mca.watch.contacts import on_edges
 from warp_mca.watch.ledger import MIN_EXCHANGE
 from warp_mca.watch.row import Context, Finished, SpringShare, Values, row, sides_of
@@ -170,11 +170,17 @@ def _given(contact: Contact | ContactAll) -> bool:
 def _row_at_rest(c: Context, k: int, force: Array, greatest: int) -> int | None:
     """Row at which an interference loads contact k of bodies at rest: a press fit, or heat. None if there is none.
 
+    Bolts press bodies on each other with their own force, whatever springs take.
+
     That of the greatest force [N], of shape (row_count,), or the first one after the bodies have settled.
     """
     passes = [item for item in c.model.passes if item.contact == k]
     heated = any(isinstance(load, ThermalStrain) for load in c.scene.loads)
     if not heated and all(item.initial_overlap != "press" for item in passes):
+        return None
+    contact = c.scene.contacts[k]
+    sides = set(sides_of(contact)) if isinstance(contact, Contact) else None
+    if any({load.body, load.other} == sides for load in c.scene.loads if isinstance(load, Bolt)):
         return None
     if any(c.model.V[item.slave].any() or c.model.V[item.master].any() for item in passes):
         return None

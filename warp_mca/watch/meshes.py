@@ -130,7 +130,7 @@ def coarse_shape(c: Context, most: float) -> Iterator[Values]:
 )
 def free_joint_node(c: Context, _: float) -> Iterator[Values]:
     """Nodes of joints where two bodies meet that bind only some of them, as meshes that differ there leave."""
-    for joint, pairs in zip(c.scene.joints, c.model.joints, strict=True):
+    for joint, pairs in zip(c.scene.acting_joints, c.model.joints, strict=True):
         if joint.other is None or not isinstance(joint, (Prismatic, Weld)) or joint.nodes is None:
             continue
         assert joint.other_nodes is not None

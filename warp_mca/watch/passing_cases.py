@@ -212,7 +212,7 @@ def cases_of(scene: Scene, meshes: Mapping[str, Mesh], model: Model, skins: Sequ
         if not kept_out.all():
             yield BelowPlane((skin,), own, kept_out, plane)
     bound = _bound_nodes(scene, meshes, model)
-    whole = {frozenset((joint.body, joint.other)) for joint in scene.joints if joint.whole()}
+    whole = {frozenset((joint.body, joint.other)) for joint in scene.acting_joints if joint.whole()}
     links = frozenset().union(*whole) | {item.body for item in scene.fixed}
     given = {body.name for body in scene.bodies if body.mass is not None}
     for numbers in combinations(range(len(skins)), 2):
@@ -233,7 +233,7 @@ def cases_of(scene: Scene, meshes: Mapping[str, Mesh], model: Model, skins: Sequ
 def _bound_nodes(scene: Scene, meshes: Mapping[str, Mesh], model: Model) -> dict[frozenset[str], list[Index]]:
     """Nodes that each joint or tie between two bodies binds, in the model's numbering, by the bodies' names."""
     found: dict[frozenset[str], list[Index]] = {}
-    for joint, pairs in zip(scene.joints, model.joints, strict=True):
+    for joint, pairs in zip(scene.acting_joints, model.joints, strict=True):
         if joint.other is not None:
             nodes = np.concatenate([at[pairs.start : pairs.end] for at in (model.joint_first, model.joint_second)])
             found.setdefault(frozenset((joint.body, joint.other)), []).append(nodes[nodes >= 0])

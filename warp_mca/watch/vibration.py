@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from warp_mca.kernels.records.columns import FRICTION, IMPULSE, NORMAL_IMPULSE, SPRING_ENERGY, STICK_IMPULSE
 from warp_mca.physics.contact.sides import face_geometry
 from warp_mca.physics.elements.cells import body_materials
+from warp_mca.scene import Damping
 from warp_mca.watch.row import Array, Context, Finished, Values, listed_passes, row, sides_of
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ def ringing(c: Finished, times: float) -> Iterator[Values]:
     Bodies that meet with speed v press on each other with Z v at most, Z = Z_1 Z_2 / (Z_1 + Z_2), where rho c A of
     either body is at least Z_k: c is the speed of dilatational waves and A the area of its shadow along the normal.
     Waves that come back from free ends only take from it. So nothing is said of bodies that have more behind them or
-    meet twice: with joints, ties, driven nodes, or other contacts.
+    meet twice: with joints, ties, loads, driven nodes, or other contacts.
     """
     for _, item, contact in listed_passes(c.scene, c.model):
         history = c.contacts[item.contact]
@@ -162,6 +163,7 @@ def _is_first_impact(c: Finished, contact: Contact, item: ContactPass) -> bool:
     scene = c.scene
     bound = {name for joint in scene.joints for name in (joint.body, joint.other)}
     bound |= {name for tie in scene.ties for name in (tie.slave.body, tie.master.body)}
+    bound |= {name for load in scene.loads if not isinstance(load, Damping) for name in load.bodies().values()}
     bound |= {prescribed.body for prescribed in scene.prescribed}
     bound |= {name for other in scene.contacts if other is not contact for name in sides_of(other)}
     normal = c.model.contact_axes[item.contact, 0]

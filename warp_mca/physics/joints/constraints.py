@@ -176,7 +176,7 @@ def join_bodies(parts: Bodies) -> tuple[dict[str, NDArray], tuple[JointPairs, ..
     """
     found, joints, start = [], [], 0
     slides = [np.zeros((0, 3), np.int32)]
-    for joint in parts.scene.joints:
+    for joint in parts.scene.acting_joints:
         found.append(_tied_pairs(parts, joint, start))
         slides.append(found[-1].slides + np.int32(start))
         joints.append(JointPairs(name=joint.name, start=start, end=start + len(found[-1].first)))
@@ -209,7 +209,7 @@ def _check_shared(parts: Bodies, joints: Sequence[JointPairs], pairs: dict[str, 
 
 def _joints_of(parts: Bodies, joints: Sequence[JointPairs], pairs: dict[str, NDArray], node: int) -> Iterator[str]:
     """Kind and name of the joints that have a node."""
-    for joint, item in zip(parts.scene.joints, joints, strict=True):
+    for joint, item in zip(parts.scene.acting_joints, joints, strict=True):
         if any(node in pairs[key][item.start : item.end] for key in ("joint_first", "joint_second")):
             yield joint.title
 

@@ -94,7 +94,7 @@ def movable_bases(
     table = None if chain is None or chain.loads is None else chain.loads.base_velocity
     if chain is None or (table is None and chain.slide is None):
         return ()
-    (pairs,) = [own for own, joint in zip(joints, parts.scene.joints, strict=True) if joint.other is None]
+    (pairs,) = [own for own, joint in zip(joints, parts.scene.acting_joints, strict=True) if joint.other is None]
     coupling = next((k for k, item in enumerate(couplings) if item.start == pairs.start), -1)
     if coupling >= 0 and chain.slide is not None and chain.carriage_mass == 0.0:
         raise bad_value("Slide.carriage_mass", 0.0, "a pin needs a carriage with mass; give one, or tie nodes=axis")

@@ -98,7 +98,7 @@ def rigid_bodies(
         owner[own] = place
     _check_drives(parts)
     coupled = {item.start: item for item in couplings}
-    tied = [item for item in zip(parts.scene.joints, joints, strict=True) if item[0].whole() is None]
+    tied = [item for item in zip(parts.scene.acting_joints, joints, strict=True) if item[0].whole() is None]
     for joint, found in tied:
         check_joint(joint, pairs, found, owner, found.start in coupled)
     touched = np.zeros(len(parts.X), dtype=bool)

@@ -27,7 +27,7 @@ def coupler_rows(scene: Scene, joints: Sequence[BodyJoint], rates: Sequence[tupl
         RequestError: rates at the start are against a coupler.
     """
     place, rows = {item.name: k for k, item in enumerate(joints)}, []
-    freedoms = {item.name: whole.freedoms for item in scene.joints if (whole := item.whole()) is not None}
+    freedoms = {item.name: whole.freedoms for item in scene.acting_joints if (whole := item.whole()) is not None}
     for name, own in freedoms.items():
         for number, freedom in enumerate(own):
             if (coupler := freedom.follows) is None:

@@ -60,7 +60,7 @@ def join_whole(
     pins: list[RigidPin] = []
     rates: list[tuple[Array, Array]] = []
     place = {body.name: k for k, body in enumerate(bodies)}
-    for joint, own in zip(parts.scene.joints, found, strict=True):
+    for joint, own in zip(parts.scene.acting_joints, found, strict=True):
         whole = joint.whole()
         if whole is None:
             continue
