@@ -26,7 +26,7 @@ KEY = np.random.default_rng(0).integers(1, 2**62, 82) | 1  # weights that make o
 
 
 MOST_KEPT = 200_000  # elements whose arrays are compared with those of earlier runs
-_KEPT: Kept[StableStep] = Kept(64)  # found last
+_KEPT: Kept[tuple[Element, StableStep]] = Kept(64)  # found last
 
 Part = NDArray[np.intp]  # indices of some elements
 
@@ -87,9 +87,11 @@ def stable_step(elements: Elements) -> StableStep:
     """
     if len(elements.conn) > MOST_KEPT:
         return _stable_step(elements)
-    key = elements.element, elements.digest
-    found = _KEPT.get(key) or _stable_step(elements)
-    _KEPT.put(key, found)
+    key = id(elements.element), elements.digest
+    element, found = _KEPT.get(key) or (None, None)
+    if found is None or element is not elements.element:
+        found = _stable_step(elements)
+        _KEPT.put(key, (elements.element, found))
     return found
 
 
