@@ -60,7 +60,7 @@ class Elements:
         found = hashlib.sha256()
         for values in (self.X, self.conn, self.K, self.G, self.mass, self.contact, self.index):
             found.update(f"{values.dtype}{values.shape}".encode())
-            found.update(np.ascontiguousarray(values))
+            found.update(values.tobytes())
         return found.digest()
 
     def exact(self, some: Part) -> Array:
