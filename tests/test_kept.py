@@ -8,6 +8,8 @@ import pytest
 import warp_mca as mca
 from warp_mca.base.kept import Kept, unchanged
 from warp_mca.geometry.parts import Part, Parts
+from warp_mca.kernels.elements.readings import energy_kernel, stress_kernel
+from warp_mca.model import stable_step
 from warp_mca.model.build import build_model
 from warp_mca.phases.meshing import mesh
 from warp_mca.physics.elements.cells import nodal_masses
@@ -127,6 +129,26 @@ def test_an_equal_swing_is_computed_once():
     assert hand_off(lower, meshes, masses).t_contact != hand_off(scene, meshes, masses).t_contact
 
 
+def test_a_stable_step_of_equal_arrays_is_found_once(monkeypatch):
+    """Runs with another speed have the same; another modulus, mass or spring gives another one."""
+    found: list[float] = []
+    largest = stable_step._worst
+    monkeypatch.setattr(stable_step, "_worst", lambda *args: (found.append(0.0), largest(*args))[1])
+    scene = mca.make_scene("single_rod", section=2, ring=1, axial=21)
+
+    def step(**changes: float) -> float:
+        changed = mca.make_scene("single_rod", section=2, ring=1, axial=21, **changes)
+        points = {name: mesh.points for name, mesh in meshes.items()}
+        return build_model(changed, meshes, points, {name: 0.0 * x for name, x in points.items()}).stable.dt
+
+    meshes = mca.mesh(scene)
+    first = step()
+    count = len(found)
+    assert step(v=2.0) == first and len(found) == count > 0
+    assert step(E=3e11) < first and step(rho=3000.0) > first and step(penalty=9.0) <= first
+    assert len(found) == 4 * count
+
+
 def test_kernels_that_are_loaded_are_not_hashed_anew():
     """Warp hashes a module again, for 15 ms, whose options were set."""
     scene = alone(mca.Box(size=(1.0, 1.0, 1.0), divisions=(2, 2, 2)))
@@ -140,5 +162,7 @@ def test_kernels_that_are_loaded_are_not_hashed_anew():
         (stage,) = solver.elements
         return [kernel.module.hashers for kernel in (stage.force_kernel, stage.energy_kernel, stage.stress_kernel)]
 
-    first, again = loaded(), loaded()
+    first, made = loaded(), [maker.cache_info().misses for maker in (energy_kernel, stress_kernel)]
+    again = loaded()
+    assert made == [maker.cache_info().misses for maker in (energy_kernel, stress_kernel)]
     assert any(first) and all(a is b for a, b in zip(first, again, strict=True))

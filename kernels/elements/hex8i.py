@@ -209,6 +209,7 @@ def formulation(points: int, precision: str, law_name: str, finite: bool) -> For
     return Formulation("hex8i", 8, points, *given, enriched=enriched, lags=lag, split=split)
 
 
+@cache  # makers keep kernels by what they are called with: these parts of them are the same each time
 def kernels(points: int) -> SimpleNamespace:
     """What `ElementStage` asks of a module of kernels, for elements of so many points."""
     maker = partial(formulation, points)

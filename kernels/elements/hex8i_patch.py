@@ -107,6 +107,7 @@ def element(points: int, precision: str, law_name: str, viscous: int = 0) -> Pat
     return PatchElement("hex8i", load_patterns, load_displacement_patterns, compute_element, prepare, flow, lanes=2)
 
 
+@cache  # makers keep kernels by what they are called with: these parts of them are the same each time
 def kernels(points: int) -> SimpleNamespace:
     """What `PatchStage` asks of a module of kernels, for elements of so many points."""
     maker = partial(element, points)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import io
 import os
 import pickle
@@ -75,6 +76,8 @@ class Helpers:
         self._modules = modules
         self._all: list[_Helper] = []
         self._where: object = None
+        self._owner = os.getpid()
+        atexit.register(self.end)
 
     @property
     def count(self) -> int:
@@ -120,10 +123,10 @@ class Helpers:
         return [answers[k] if k in answers else here(k) for k in range(jobs)]
 
     def end(self) -> None:
-        """End all."""
-        for helper in self._all:
+        """End all; a copy of the process that started them, as `fork` makes it, leaves them alone."""
+        for helper in self._all if self._owner == os.getpid() else ():
             helper.end()
-        self._all = []
+        self._all, self._owner = [], os.getpid()
 
     def _answers(
         self,
@@ -160,11 +163,11 @@ class Helpers:
         return answers
 
     def _begin(self, count: int) -> None:
-        for helper in [helper for helper in self._all if helper.process.poll() is not None]:
-            self._lose(helper)
         if self._where != _surroundings():
             self.end()
         self._where = _surroundings()
+        for helper in [helper for helper in self._all if helper.process.poll() is not None]:
+            self._lose(helper)
         with suppress(OSError, _LostError):
             while len(self._all) < count:
                 self._all.append(_Helper(self._modules))
@@ -207,6 +210,6 @@ class _Reader(pickle.Unpickler):
 def _surroundings() -> object:
     """What a helper has of this process from its start on; None where the working directory is gone."""
     try:
-        return str(Path.cwd()), tuple(sys.path), dict(os.environ)
+        return os.getpid(), str(Path.cwd()), tuple(sys.path), dict(os.environ)
     except OSError:
         return None

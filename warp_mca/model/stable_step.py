@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from warp_mca.base.arrays import Array, Index
 from warp_mca.base.chunks import CHUNK, chunks
 from warp_mca.base.errors import RequestError, bad_value
+from warp_mca.base.kept import Kept
 from warp_mca.physics.elements import Element
 from warp_mca.system.time_step import StableStep
 
@@ -22,6 +24,9 @@ MAX_EXACT = 266 * BATCH  # elements with exact eigenvalues: each 24 x 24 problem
 BOUNCE, SUPPORT, USUAL_SCALE = 1.0, 1.0, 0.9
 KEY = np.random.default_rng(0).integers(1, 2**62, 82) | 1  # weights that make one number of an element's shape
 
+
+MOST_KEPT = 200_000  # elements whose arrays are compared with those of earlier runs
+_KEPT: Kept[tuple[Element, StableStep]] = Kept(64)  # found last
 
 Part = NDArray[np.intp]  # indices of some elements
 
@@ -49,6 +54,15 @@ class Elements:
     contact: Array
     index: Index
 
+    @property
+    def digest(self) -> bytes:
+        """Of all arrays, equal for equal ones."""
+        found = hashlib.sha256()
+        for values in (self.X, self.conn, self.K, self.G, self.mass, self.contact, self.index):
+            found.update(f"{values.dtype}{values.shape}".encode())
+            found.update(values.tobytes())
+        return found.digest()
+
     def exact(self, some: Part) -> Array:
         """Largest eigenvalues of some elements by themselves [1/s^2]."""
         return self.element.largest_eigenvalues(*self._of(some))
@@ -65,8 +79,24 @@ class Elements:
         return self.X[self.conn[some]], self.K[some], self.G[some], self.mass[some]
 
 
-@np.errstate(divide="ignore", over="ignore", invalid="ignore")  # bounds that are not numbers are refused
 def stable_step(elements: Elements) -> StableStep:
+    """Stable step of elements, that of the same arrays taken from an earlier run of this process.
+
+    Raises:
+        RequestError: as in `_stable_step`.
+    """
+    if len(elements.conn) > MOST_KEPT:
+        return _stable_step(elements)
+    key = id(elements.element), elements.digest
+    element, found = _KEPT.get(key) or (None, None)
+    if found is None or element is not elements.element:
+        found = _stable_step(elements)
+        _KEPT.put(key, (elements.element, found))
+    return found
+
+
+@np.errstate(divide="ignore", over="ignore", invalid="ignore")  # bounds that are not numbers are refused
+def _stable_step(elements: Elements) -> StableStep:
     """Stable step from max over elements of (element eigenvalue + contact eigenvalue), both upper bounds of their part.
 
     Springs that dominate count for more, since they open and close.

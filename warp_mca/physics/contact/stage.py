@@ -297,5 +297,4 @@ class ContactStage:
 
     def depths(self, state: State, scene: int) -> NDArray[np.float64]:
         """Largest penetration so far of each spring of a scene [m], those of slave 0 first, shape (spring_count,)."""
-        depth = on_host(state.contacts[self.index].spring.depth)
-        return depth[self.springs[scene] : self.springs[scene + 1]]
+        return on_host(state.contacts[self.index].spring.depth)[self.springs[scene] : self.springs[scene + 1]]
