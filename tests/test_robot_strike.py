@@ -177,7 +177,6 @@ def test_a_mesh_beside_its_link_is_refused_by_its_place(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('<body name="fore"', '<body name="fore" gravcomp="1"', "gravcomp of link fore"),
         ("</worldbody>", f"</worldbody>{HELD}", "equality = 'stop': it holds joint j6 at a place"),
         ('range="-2.2 2.2" damping="0.05"', 'range="-2.2 2.2" damping="-0.05"', "damping of joint j5 = -0.05"),
         ("</worldbody>", f'</worldbody><option><flag equality="disable"/></option>{GEARED}', "equality disabled"),
@@ -368,7 +367,7 @@ def test_swings_of_other_machines_and_freedoms_that_are_one_are_refused(tmp_path
 
 
 def test_compensated_gravity_is_not_felt_in_an_impact(tmp_path):
-    """Links feel (1 - gravcomp) g, a flexible body beside all of it; links that differ are refused."""
+    """Links feel (1 - gravcomp) g, a flexible body beside all of it, so that a scene with a rigid one has it all."""
     text = """<mujoco><worldbody>
       <body name="a" gravcomp="0.75"><joint name="h" axis="0 1 0"/><geom size="0.1" mass="1"/>
         <body name="b" gravcomp="0.75" pos="0.5 0 0"><geom name="head" size="0.1" mass="1"/></body>
@@ -384,9 +383,84 @@ def test_compensated_gravity_is_not_felt_in_an_impact(tmp_path):
     scene = alone.strike(impact=scene.impact, swing=swing)
     back = alone.after(swing, scene, mca.run(scene, precision="float64"))
     assert back.robot.qvel == pytest.approx(alone.swing(t_end=back.robot.clock).qvel, abs=1e-8)
-    unlike = robot(text.replace('name="b" gravcomp="0.75"', 'name="b"'), tmp_path)
-    with pytest.raises(mca.RequestError, match=r"gravcomp of link b = 0\.0: other links have 0.75"):
-        unlike.strike(impact=scene.impact, swing=unlike.swing(t_end=1e-3))
     rigid = robot(text, tmp_path, against=(replace(beside, rigid=True),))
-    with pytest.raises(mca.RequestError, match="leave rigid=True out there"):
-        rigid.strike(impact=scene.impact, swing=rigid.swing(t_end=1e-3))
+    scene = rigid.strike(impact=scene.impact, swing=rigid.swing(t_end=1e-3))
+    assert scene.gravity == (0.0, 0.0, -9.81)
+    block = mca.run(scene, precision="float64").summary["rigid_bodies"]["block"]
+    assert block["momentum"][2] == pytest.approx(-9.81e-3 * block["mass"])
+
+
+@pytest.mark.parametrize(("one", "other"), [(0.0, 0.75), (1.0, 0.25)])
+def test_each_link_feels_the_gravity_that_is_left_to_it(tmp_path, one, other):
+    """An impact without a touch goes on as a swing does; a flexible link is borne as a whole, what rides on it, too."""
+    text = f"""<mujoco><worldbody>
+      <body name="a" gravcomp="{one}"><joint name="h" axis="0.1 1 0.3"/><geom size="0.1" mass="1"/>
+        <body name="b" gravcomp="{other}" pos="0.5 0 0"><joint name="k" axis="0.3 1 0"/>
+          <geom size="0.1" pos="0.2 0.1 0" mass="2"/></body></body>
+      <body name="c" pos="3 0 0" gravcomp="{other}"><freejoint/>
+        <geom type="box" size="0.05 0.05 0.05" mass="15"/></body>
+      </worldbody></mujoco>"""
+    cube = mca.Box(size=(0.1,) * 3, divisions=(2, 2, 2), origin=(-0.05,) * 3)
+    machine = robot(text, tmp_path, flexible={"c": cube}, material=STEEL, mounts={"c": "zmin"})
+    swing = machine.swing(t_end=1e-3)
+    scene = machine.strike(impact=mca.ImpactPhase(duration=1e-3, output_interval=1e-4), swing=swing)
+    back = machine.after(swing, scene, mca.run(scene, precision="float64"))
+    wanted = machine.swing(t_end=back.robot.clock).qvel
+    assert back.robot.qvel == pytest.approx(wanted, abs=1e-6 * np.abs(wanted).max())
+
+
+def test_flexible_links_on_balls_and_in_free_flight_come_back(tmp_path):
+    """Their pose is the mean of their nodes; the mesh is given in a frame of its own, the motion is that of a swing."""
+    text = """<mujoco><worldbody>
+      <body name="a"><joint name="h" axis="0.1 1 0.3"/><geom size="0.1" mass="4"/>
+        <body name="b" pos="0.5 0 0" euler="0 30 50"><joint name="k" type="ball"/>
+          <geom name="hung" type="box" size="0.05 0.05 0.05" pos="0.2 0 0" mass="7.85"/></body></body>
+      <body name="c" pos="3 0 0" euler="40 20 0"><freejoint name="f"/>
+        <geom name="thrown" type="box" size="0.05 0.05 0.05" mass="7.85"/></body></worldbody></mujoco>"""
+    cube = mca.Box(size=(0.1,) * 3, divisions=(12,) * 3, origin=(-0.05,) * 3)
+    turned = mca.Body(
+        name="b", geometry=cube, material=STEEL, position=(0.2, 0.0, 0.0), rotation=(0.5 * np.pi, 0.0, 0.0)
+    )
+    flexible = {"b": turned, "c": replace(turned, name="c", position=(0.0,) * 3, rotation=(0.0, 0.5 * np.pi, 0.0))}
+    rates = {"k": (1.0, 2.0, 3.0), "f": (0.1, 0.2, 0.3, 3.0, -2.0, 1.0), "h": 2.0}
+    machine = robot(text, tmp_path, flexible=flexible, mounts={"b": "xmin"}, qvel=rates)
+    swing = machine.swing(t_end=1e-3)
+    scene = machine.strike(impact=mca.ImpactPhase(duration=1e-3, output_interval=1e-4), swing=swing)
+    back = machine.after(swing, scene, mca.run(scene))
+    on = machine.swing(t_end=back.robot.clock)
+    assert back.robot.qpos == pytest.approx(on.qpos, abs=2e-6)
+    assert back.robot.qvel == pytest.approx(on.qvel, abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("joint", "actuators"),
+    [
+        ("", '<position joint="h" kp="30" forcerange="-2 2"/><velocity joint="h" kv="0.4"/>'),
+        ("", '<position joint="h" kp="30" kv="1" forcerange="-9 9"/><motor joint="h" forcerange="-0.3 0.3"/>'),
+        (
+            'stiffness="3" springref="0.3"',
+            '<position joint="h" kp="30" forcerange="-2 2"/><position joint="h" kp="9"/>',
+        ),
+        ('actuatorfrcrange="-5 5"', '<position joint="h" kp="3"/><velocity joint="h" kv="0.4"/>'),
+    ],
+)
+def test_actuators_that_share_a_joint_act_together(tmp_path, joint, actuators):
+    """One clamp beside drives without, or one clamp of all: the impact goes on as the swing does."""
+    text = f"""<mujoco><option gravity="0 0 0"/><worldbody><body><joint name="h" {joint}/><geom size="0.1" mass="1"/>
+      </body></worldbody><actuator>{actuators}</actuator></mujoco>"""
+    machine = robot(text, tmp_path, qvel={"h": 2.0}, ctrl=(-0.2, -0.9))
+    swing = machine.swing(t_end=1e-3)
+    scene = machine.strike(impact=mca.ImpactPhase(duration=0.05, output_interval=1e-3), swing=swing)
+    back = machine.after(swing, scene, mca.run(scene, precision="float64"))
+    wanted = machine.swing(t_end=back.robot.clock).qvel
+    assert back.robot.qvel == pytest.approx(wanted, rel=2e-4)
+    assert abs(wanted[0] - 2.0) > 0.5
+
+
+def test_two_clamps_that_move_are_refused(tmp_path):
+    text = """<mujoco><worldbody><body><joint name="h"/><geom size="0.1" mass="1"/></body></worldbody><actuator>
+      <position joint="h" kp="3" forcerange="-2 2"/><velocity joint="h" kv="1" forcerange="-1 1"/>
+      </actuator></mujoco>"""
+    machine = robot(text, tmp_path)
+    with pytest.raises(mca.RequestError, match="actuators of joint = 'h': actuators whose force follows position or"):
+        machine.strike(impact=IMPACT, swing=machine.swing(t_end=1e-3))

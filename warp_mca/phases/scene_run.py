@@ -171,8 +171,8 @@ class SceneRun:
         found["rigid_bodies"] = rigid_bodies(model, u, v)
         if model.body_joints:
             found["joints"] = joint_reports(self.solver, self.index, history)
-            names = [body.name for body in scene.bodies if not body.rigid]
-            found["flexible_bodies"] = flexible_bodies(model, u, v, names)
+        names = [body.name for body in scene.bodies if not body.rigid]
+        found["flexible_bodies"] = flexible_bodies(model, u, v, names)
         return found
 
     def _facts(self, wall: Mapping[str, float], shares: Mapping[str, SpringShare | None]) -> dict[str, Any]:

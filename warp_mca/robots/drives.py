@@ -47,28 +47,6 @@ def refuse_at_hand_off(machine: Machine) -> None:
                 raise bad_value(f"{what} of joint {names.joint(k)}", float(value), remedy)
 
 
-def compensated(machine: Machine) -> float:
-    """Share of gravity that is compensated in the moving links (gravcomp), the same in all that have mass [-].
-
-    Raises:
-        RequestError: it differs from link to link, or drives with clamps hold it.
-    """
-    model, first = machine.model, None
-    for k in range(1, model.nbody):
-        if not model.body_weldid[k] or not model.body_mass[k]:
-            continue
-        found = float(model.body_gravcomp[k])
-        if first is not None and found != first:
-            remedy = f"other links have {first:g}, and an impact carries one value; give all links the same"
-            raise bad_value(f"gravcomp of link {machine.names.body(k)}", found, remedy)
-        first = found
-    held = model.jnt_actgravcomp.astype(bool) & model.jnt_actfrclimited.astype(bool)
-    if first and held.any():
-        name = machine.names.joint(int(np.flatnonzero(held)[0]))
-        raise bad_value(f"actuatorgravcomp of joint {name}", True, "its clamp acts on it; leave actuatorfrcrange out")
-    return first or 0.0
-
-
 class Drive(NamedTuple):
     """Torque of an actuator on a joint: clamp(constant - kp q - kv q').
 
@@ -82,6 +60,9 @@ class Drive(NamedTuple):
     kp: float
     kv: float
     limits: tuple[float, float] | None
+
+
+NO_DRIVE = Drive(0.0, 0.0, 0.0, None)
 
 
 def freedom_of(machine: Machine, joint: int, qpos: Array, gearing: Gearing) -> Freedom:
@@ -98,10 +79,12 @@ def freedom_of(machine: Machine, joint: int, qpos: Array, gearing: Gearing) -> F
     if kind == int(mj.mjtJoint.mjJNT_BALL):
         return Freedom(kind="ball", at=at, damping=float(model.dof_damping[dof]))  # type: ignore[arg-type]
     zero = float(model.qpos0[place])
-    motor, damping = _motor(machine, joint, zero, gearing)
+    motor, beside = _motor(machine, joint, zero, gearing)
     stiffness, rest, slowed = gearing.spring(
         joint, float(model.jnt_stiffness[joint]), float(model.qpos_spring[place]) - zero
     )
+    if beside.kp:
+        stiffness, rest = stiffness + beside.kp, stiffness * rest / (stiffness + beside.kp)
     found: dict[str, Any] = {}
     if dof in (listed := machine.limited.tolist()):
         k = listed.index(dof)
@@ -115,7 +98,7 @@ def freedom_of(machine: Machine, joint: int, qpos: Array, gearing: Gearing) -> F
         position=float(qpos[place]) - zero,
         stiffness=stiffness,
         rest=rest,
-        damping=float(model.dof_damping[dof]) + damping + slowed,
+        damping=float(model.dof_damping[dof]) + beside.kv + slowed,
         friction=float(model.dof_frictionloss[dof]),
         friction_rate=FRICTION_RATE,
         armature=float(model.dof_armature[dof]),
@@ -127,8 +110,11 @@ def freedom_of(machine: Machine, joint: int, qpos: Array, gearing: Gearing) -> F
 
 def _motor(
     machine: Machine, joint: int, zero: float, gearing: Gearing
-) -> tuple[Amplitude | PositionServo | None, float]:
-    """What drives a joint during an impact at held controls, and the damping that goes with it.
+) -> tuple[Amplitude | PositionServo | None, Drive]:
+    """What drives a joint during an impact at held controls, and the spring about 0 and damping that go with it.
+
+    Of actuators that share a joint one at most has a clamp that moves: the constant of the others moves its clamp, and
+    what they follow is a spring and a damper.
 
     Raises:
         RequestError: several actuators with clamps drive it, or one drives it away from rest.
@@ -138,30 +124,49 @@ def _motor(
     drives = [drive_of(machine, int(k), 1.0, zero) for k in np.flatnonzero(own & (model.actuator_trntype != tendon))]
     drives += gearing.drives(joint)
     if machine.passive or not drives:
-        return None, 0.0
-    if len(drives) > 1 and any(drive.limits for drive in drives):
-        remedy = "actuators with a forcerange that share a joint are not carried; give the joint one"
+        return None, NO_DRIVE
+    drives = [_held(drive) for drive in drives]
+    clamped = [drive for drive in drives if drive.limits]
+    if len(clamped) > 1:
+        remedy = "actuators whose force follows position or rate within a forcerange share it; give it one of these"
         raise bad_value("Robot: actuators of joint", name, remedy)
-    constant, kp, kv = (float(v) for v in np.sum([drive[:3] for drive in drives], axis=0))
-    limits = drives[0].limits
+    free = _sum([drive for drive in drives if not drive.limits])
     if model.jnt_actfrclimited[joint]:  # effort of a URDF
-        if len(drives) > 1:
-            low, high = (float(v) for v in model.jnt_actfrcrange[joint])
+        low, high = (float(v) for v in model.jnt_actfrcrange[joint])
+        if clamped and len(drives) > 1:
             remedy = "actuators that share a joint whose sum is clamped are not carried; give the joint one"
             raise bad_value(f"actuatorfrcrange of joint {name}", (low, high), remedy)
-        low, high = (-np.inf, np.inf) if limits is None else limits
-        least, most = (float(v) for v in model.jnt_actfrcrange[joint])
-        limits = (max(low, least), min(high, most))
-    if kp < 0.0 or kv < 0.0:
+        if clamped:
+            least, most = clamped[0].limits or (-np.inf, np.inf)
+            low, high, free = max(low, least), min(high, most), clamped[0]
+        clamped, free = [_held(free._replace(limits=(low, high)))], NO_DRIVE
+    motor, beside = (clamped[0], free) if clamped else (free, NO_DRIVE)
+    if min(motor.kp, motor.kv, beside.kp, beside.kv) < 0.0:
         remedy = "it drives the joint away from where it is; give a servo with kp and kv of 0 or above"
         raise bad_value("Robot: actuators of joint", name, remedy)
+    if motor.limits and beside.constant:
+        low, high = (limit + beside.constant for limit in motor.limits)
+        motor = motor._replace(constant=motor.constant + beside.constant, limits=(low, high))
+    constant, kp, kv, limits = motor
     if kp == 0.0 and limits is None:
-        return (Amplitude(times=(0.0,), values=(constant,)) if constant else None), kv
-    if kp == 0.0 and kv == 0.0 and limits is not None:
-        return Amplitude(times=(0.0,), values=(float(np.clip(constant, *limits)),)), 0.0
+        motion = Drive(0.0, beside.kp, beside.kv + kv, None)
+        return (Amplitude(times=(0.0,), values=(constant,)) if constant else None), motion
     if kp == 0.0:
         kp = SOFT * max(abs(constant), 1.0)
-    return PositionServo(kp=kp, kv=kv, target=constant / kp, limits=limits), 0.0
+    return PositionServo(kp=kp, kv=kv, target=constant / kp, limits=limits), beside
+
+
+def _held(drive: Drive) -> Drive:
+    """A drive that follows nothing, as the constant torque that its clamp leaves; others as they are."""
+    if drive.limits is None or drive.kp or drive.kv:
+        return drive
+    return Drive(float(np.clip(drive.constant, *drive.limits)), 0.0, 0.0, None)
+
+
+def _sum(drives: list[Drive]) -> Drive:
+    """Drives without clamps as one."""
+    constant, kp, kv = (sum(float(drive[k] or 0.0) for drive in drives) for k in range(3))  # type: ignore[arg-type]
+    return Drive(constant, kp, kv, None)
 
 
 def drive_of(machine: Machine, k: int, pull: float, zero: float) -> Drive:

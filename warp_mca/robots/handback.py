@@ -53,7 +53,7 @@ def hand_back(robot: Robot, swing: RobotSwing, scene: Scene, result: Result) -> 
     machine = Machine(robot)
     q = swing.qpos.copy()
     rotor = np.zeros(machine.nv)
-    ends = _Ends(scene, summary)
+    ends = _Ends(scene, summary, robot.flexible)
     for link in range(1, machine.model.nbody):
         _take_joints(machine, link, q, rotor, swing, ends)
     y = np.concatenate([q, np.zeros(machine.nv + 2)])
@@ -104,8 +104,10 @@ class _Ends:
         moved: mass centre [m], momentum [kg m/s], spin [kg m^2/s], each shape (3,), and kinetic energy [J], by name.
     """
 
-    def __init__(self, scene: Scene, summary: Mapping[str, Any]) -> None:
-        self._scene, self._summary = scene, summary
+    def __init__(self, scene: Scene, summary: Mapping[str, Any], flexible: Mapping[str, Body]) -> None:
+        self._summary, self._flexible = summary, flexible
+        self._bodies = {body.name: body for body in scene.bodies}
+        self._facts = {**summary["rigid_bodies"], **summary["flexible_bodies"]}
         self.moved: dict[str, tuple[Array, Array, Array, float]] = {}
         self._turned: dict[str, Array] = {}
         for name, found in summary["rigid_bodies"].items():
@@ -113,13 +115,15 @@ class _Ends:
             self._turned[name] = rotation_matrix(found["rotation"])
             own = 0.5 * float(P @ P) / found["mass"] + 0.5 * float(L @ self.spin(name, L))
             self.moved[name] = np.array(found["centre"]), P, L, own
-        for name, found in summary.get("flexible_bodies", {}).items():
+        for name, found in summary["flexible_bodies"].items():
+            self._turned[name] = rotation_matrix(found["rotation"])
             centre, P, L = (np.array(found[key]) for key in ("centre", "momentum", "spin"))
             self.moved[name] = centre, P, L, float(found["kinetic"])
 
     def rotation(self, name: str) -> Array:
-        """From the frame of a rigid body to the world at the end, shape (3, 3)."""
-        return self._turned[name] @ rotation_matrix(self._scene.body(name).rotation)
+        """From the frame of a link or body to the world at the end, shape (3, 3); of flexible ones as a mean."""
+        name = self._holder(name)
+        return self._turned[name] @ self._frame(name)[1]
 
     def spin(self, name: str, L: Array) -> Array:
         """Angular velocity of a rigid body at an angular momentum L about its centre [rad/s], shape (3,)."""
@@ -128,10 +132,25 @@ class _Ends:
         return np.asarray(np.linalg.solve(inertia, L), dtype=np.float64)
 
     def origin(self, name: str) -> Array:
-        """Of the frame of a rigid body at the end [m], shape (3,)."""
-        found, body = self._summary["rigid_bodies"][name], self._scene.body(name)
+        """Of that frame at the end [m], shape (3,)."""
+        name = self._holder(name)
+        found = self._facts[name]
         before = np.array(found["centre"]) - np.array(found["displacement"])
-        return self.moved[name][0] + self._turned[name] @ (np.array(body.position) - before)
+        return self.moved[name][0] + self._turned[name] @ (self._frame(name)[0] - before)
+
+    def _holder(self, name: str) -> str:
+        """What rides on a flexible link in its place, where something does."""
+        return name + REST if name + REST in self.moved else name
+
+    def _frame(self, name: str) -> tuple[Array, Array]:
+        """Origin [m], shape (3,), and rotation, shape (3, 3), of such a frame at the start."""
+        body = self._bodies[name]
+        origin, rotation = np.array(body.position), rotation_matrix(body.rotation)
+        if name in self._flexible:
+            own = self._flexible[name]
+            rotation = rotation @ rotation_matrix(own.rotation).T
+            origin = origin - rotation @ np.array(own.position)
+        return origin, rotation
 
     def joint(self, name: str) -> tuple[Array, Array]:
         """Positions and rates of the freedoms of a joint, each shape (count,)."""

@@ -12,10 +12,11 @@ from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.robots.contacts import Contacts
-from warp_mca.robots.drives import compensated, freedom_of, refuse_at_hand_off
+from warp_mca.robots.drives import freedom_of, refuse_at_hand_off
 from warp_mca.robots.gearing import Gearing, joint_name
+from warp_mca.robots.gravity import gravity_of
 from warp_mca.robots.masses import MassProperties, of_link
-from warp_mca.scene import Articulation, Body, BodyForce, Fixed, Freedom, Scene
+from warp_mca.scene import Articulation, Body, Fixed, Freedom, Scene
 from warp_mca.scene.phases import ImpactPhase
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ class HandOff:
             if model.eq_active0[k] and int(model.eq_type[k]) != int(self.machine.mj.mjtEq.mjEQ_JOINT):
                 self._add_loop(k)
         self.bodies += contacts.beside()
-        gravity, loads = self._gravity()
+        gravity, loads = gravity_of(self.robot, self.machine, REST)
         touch = self.swing.touch
         facts: dict[str, object] = {"robot": str(self.robot.path), "swing": self.swing.t_end}
         if touch:
@@ -90,23 +91,6 @@ class HandOff:
             impact=impact,
             parameters=facts,
         )
-
-    def _gravity(self) -> tuple[Any, tuple[BodyForce, ...]]:
-        """Gravity that the links feel [m/s^2], and what bodies beside feel of it where links are compensated.
-
-        Raises:
-            RequestError: a rigid body beside would feel less of it.
-        """
-        model, share = self.machine.model, compensated(self.machine)
-        if int(model.opt.disableflags) & int(self.machine.mj.mjtDisableBit.mjDSBL_GRAVITY):
-            return (0.0, 0.0, 0.0), ()
-        g = np.array(model.opt.gravity)
-        beside = [item for item in self.robot.against if isinstance(item, Body)] if share and g.any() else []
-        for item in beside:
-            if item.rigid:
-                remedy = "links with gravcomp go with flexible bodies beside; leave rigid=True out there"
-                raise bad_value("Robot.against", item.name, remedy)
-        return _vec((1.0 - share) * g), tuple(BodyForce(body=b.name, acceleration=_vec(share * g)) for b in beside)
 
     def _moves(self, link: int) -> bool:
         return int(self.machine.model.body_weldid[link]) != 0

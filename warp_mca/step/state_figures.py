@@ -72,19 +72,22 @@ def rigid_bodies(model: Model, u: Array, v: Array) -> dict[str, dict[str, object
     """
     found: dict[str, dict[str, object]] = {}
     for body in model.rigid_bodies:
-        m, X, x, w = model.mass[body.nodes], model.X[body.nodes], (model.X + u)[body.nodes], v[body.nodes]
-        way = m @ u[body.nodes] / m.sum()
-        centre = body.centre + way
-        found[body.name] = {
-            "mass": body.mass,
-            "inertia": body.inertia.tolist(),
-            "centre": centre.tolist(),
-            "displacement": way.tolist(),
-            "rotation": rotation_vector(mean_pose(X, x, m)[2]).tolist(),
-            "momentum": (m @ w).tolist(),
-            "spin": (m @ np.cross(x - centre, w)).tolist(),
-        }
+        own = {"mass": body.mass, "inertia": body.inertia.tolist()}
+        found[body.name] = own | _motion(body.centre, *(field[body.nodes] for field in (model.mass, model.X, u, v)))
     return found
+
+
+def _motion(centre: Array, m: Array, X: Array, u: Array, v: Array) -> dict[str, object]:
+    """As in `rigid_bodies`, of nodes of masses m at X whose mass centre was there at the start."""
+    way = m @ u / m.sum()
+    x, centre = X + u, centre + way
+    return {
+        "centre": centre.tolist(),
+        "displacement": way.tolist(),
+        "rotation": rotation_vector(mean_pose(X, x, m)[2]).tolist(),
+        "momentum": (m @ v).tolist(),
+        "spin": (m @ np.cross(x - centre, v)).tolist(),
+    }
 
 
 def rigid_extremes(solver: Solver, state: State, scene: int) -> RigidExtremes | None:
@@ -98,7 +101,7 @@ def rigid_extremes(solver: Solver, state: State, scene: int) -> RigidExtremes | 
 
 
 def flexible_bodies(model: Model, u: Array, v: Array, names: Sequence[str]) -> dict[str, dict[str, object]]:
-    """What moves flexible bodies of a scene, by name: as `rigid_bodies`, and kinetic energy [J].
+    """What moves flexible bodies of a scene, by name: as `rigid_bodies`, rotation as a mean, and kinetic energy [J].
 
     Args:
         model, u, v: as there.
@@ -109,15 +112,9 @@ def flexible_bodies(model: Model, u: Array, v: Array, names: Sequence[str]) -> d
     for name in names:
         first = model.node_start[name]
         own = slice(first, starts[starts.index(first) + 1])
-        m, x, w = model.mass[own], model.X[own] + u[own], v[own]
-        centre, momentum = m @ x / m.sum(), m @ w
-        found[name] = {
-            "mass": float(m.sum()),
-            "centre": centre.tolist(),
-            "momentum": momentum.tolist(),
-            "spin": (m @ np.cross(x - centre, w)).tolist(),
-            "kinetic": 0.5 * float(m @ (w**2).sum(axis=1)),
-        }
+        m, X = model.mass[own], model.X[own]
+        kinetic = 0.5 * float(m @ (v[own] ** 2).sum(axis=1))
+        found[name] = {"mass": float(m.sum()), **_motion(m @ X / m.sum(), m, X, u[own], v[own]), "kinetic": kinetic}
     return found
 
 

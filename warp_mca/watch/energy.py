@@ -170,9 +170,8 @@ def _given(contact: Contact | ContactAll) -> bool:
 def _row_at_rest(c: Context, k: int, force: Array, greatest: int) -> int | None:
     """Row at which an interference loads contact k of bodies at rest: a press fit, or heat. None if there is none.
 
-    Bolts press bodies on each other with their own force, whatever springs take.
-
-    That of the greatest force [N], of shape (row_count,), or the first one after the bodies have settled.
+    That of the greatest force [N], of shape (row_count,), or the first one after the bodies have settled. Bolts press
+    bodies on each other with their own force, whatever springs take.
     """
     passes = [item for item in c.model.passes if item.contact == k]
     heated = any(isinstance(load, ThermalStrain) for load in c.scene.loads)
