@@ -296,3 +296,31 @@ def test_what_damping_takes_of_a_heated_body_is_right_though_velocities_change(d
     result = mca.run(made, threads=1)
     assert result.failed == ()
     assert result.summary["energy_error"] < 1e-4
+
+
+@pytest.mark.parametrize("finite", [False, True])
+def test_what_relaxes_slowly_rests_with_its_moduli_of_a_long_time(finite: bool):
+    """A column is shorter by rho g H^2 / (2 E) of these at its top, from the start of the impact on."""
+    K, G_0, H, rho = 1e6 / 3.0, 0.5e6, 0.04, 1e3
+    elastic = mca.NeoHookean(C10=G_0 / 2.0, nu=1e-9, rho=rho) if finite else mca.Elastic(E=1e6, nu=0.0, rho=rho)
+    column = mca.Body(
+        name="column",
+        geometry=mca.Box(size=(0.01, H, 0.01), divisions=(1, 4, 1)),
+        material=mca.Prony(elastic=elastic, g=(0.3, 0.2), tau=(1.0, 100.0)),
+        kinematics="finite" if finite else "corotational",
+    )
+    made = mca.Scene(
+        name="column",
+        bodies=(column,),
+        gravity=(0.0, -G, 0.0),
+        fixed=tuple(mca.Fixed(body="column", nodes=f"{axis}min", axes=axis) for axis in "xyz"),
+        probes=(mca.Probe(name="top", body="column", nodes="ymax"),),
+        impact=mca.ImpactPhase(duration=2e-3, output_interval=1e-3),
+        phases=(mca.Settle(duration=5.0),),
+    )
+    result = mca.run(made, threads=1)
+    late = 0.5 * G_0
+    shorter = rho * G * H**2 / 2.0 * (3.0 * K + late) / (9.0 * K * late)
+    height = result.probes[0].position[result.time >= 0.0, 1]
+    assert H - height == pytest.approx(shorter, rel=5e-3 if finite else 1e-3)  # right to the first order of strain
+    assert result["E_plastic"][-1] < 1e-3 * 0.5 * rho * G * 1e-4 * H * shorter

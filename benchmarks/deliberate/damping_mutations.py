@@ -32,8 +32,8 @@ DAMPING_MUTATIONS: dict[str, Mutation] = {
     "dashpot_lags": Mutation(
         "dashpots of springs read the speed of half a step before",
         "kernels/nodes/spring.py",
-        "T /= wp.float64(1.0) + wp.float64(0.5) * dt",
-        "T /= wp.float64(1.0) + wp.float64(0.0) * dt",
+        "half = wp.float64(0.5) * dt * damp[1]",
+        "half = wp.float64(0.0) * dt * damp[1]",
     ),
     "springs_stiff": Mutation(
         "springs are stiffer by a hundredth",

@@ -143,7 +143,7 @@ def parts_of(maker: Maker, precision: str, law_name: str, finite: bool) -> tuple
     form = maker(precision, law_name, finite)
     point = material_point(precision, law_name, finite)
     if point.general and form.pressure == NODAL:
-        remedy = "its law gives the pressure at each point; choose an element without nodal pressure"
+        remedy = "its material gives the pressure at each point, and this element that of its nodes; choose tet10"
         raise bad_value("Body.element", form.name, remedy)
     return form, point, form.place or same_place
 

@@ -17,6 +17,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import GuardError
+from warp_mca.kernels.materials import prony, prony_bulk
 from warp_mca.physics.contact.edge_stage import EdgeStage
 from warp_mca.scene import DampedPenalty
 
@@ -28,15 +29,34 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 ALL_AXES = 7  # at rest, in the role of a node
+AT_ONCE = 1e-6  # time in which materials relax, in steps
 HEAVY = 1e60  # mass [kg] and inertia [kg m^2] of rigid bodies that nothing moves
 
 
-class Held:
+class Exchanged:
+    """Arrays that have other values until they are released."""
+
+    def __init__(self) -> None:
+        """None yet."""
+        self.before: list[tuple[wp.array, NDArray]] = []
+
+    def _put(self, array: wp.array, values: NDArray) -> None:
+        self.before.append((array, array.numpy().copy()))
+        array.assign(values)
+
+    def release(self) -> None:
+        """Give them their own values."""
+        for array, values in self.before:
+            array.assign(values)
+
+
+class Held(Exchanged):
     """Bodies that nothing accelerates until they are released: other bodies settle on what hangs from them, too."""
 
     def __init__(self, solver: Solver, nodes: NDArray[np.bool_], bodies: NDArray[np.bool_]) -> None:
         """Hold nodes of flexible bodies, and rigid bodies."""
-        role, self.before = solver.constraints.role, []
+        super().__init__()
+        role = solver.constraints.role
         if nodes.any() and len(role):
             self._put(role, np.where(nodes, role.numpy() | ALL_AXES, role.numpy()))
         if bodies.any():
@@ -46,14 +66,21 @@ class Held:
             self._put(own.inverse_inertia, np.where(held, np.eye(3) / HEAVY, own.inverse_inertia.numpy()))
             self._put(own.gravity, np.where(bodies[:, None], 0.0, own.gravity.numpy()))
 
-    def _put(self, array: wp.array, values: NDArray) -> None:
-        self.before.append((array, array.numpy().copy()))
-        array.assign(values)
 
-    def release(self) -> None:
-        """Let all move as before."""
-        for array, values in self.before:
-            array.assign(values)
+class Relaxed(Exchanged):
+    """Viscoelastic materials that relax at once until they are released: what rests has the moduli of a long time."""
+
+    def __init__(self, solver: Solver, dt: float) -> None:
+        """Give the terms of each `Prony` series a time of 1e-6 of a step of dt [s]."""
+        super().__init__()
+        law = np.array(solver.work.law.numpy())
+        for block in solver.model.blocks:
+            module, *given = block.law.split(":")
+            if module in (prony.__name__, prony_bulk.__name__):
+                first = prony.FIRST + int(given[0])
+                law[np.unique(block.material), first : first + int(given[0])] = AT_ONCE * dt
+        if (law != solver.work.law.numpy()).any():
+            self._put(solver.work.law, law)
 
 
 class HalfSteps:
@@ -89,6 +116,7 @@ class HalfSteps:
         self.dashpots = [(item.parameters, np.array(item.parameters.numpy())) for item in damped]
         for parameters, _ in self.dashpots:
             parameters.zero_()
+        self.relaxed = Relaxed(self.solver, impact.steps.dt)
         self.held = Held(self.solver, waiting & (not falling), bodies & (not falling))
         self.now = self._half_steps()
 
@@ -178,6 +206,7 @@ class HalfSteps:
         for parameters, values in self.dashpots:
             parameters.assign(values)
         self.held.release()
+        self.relaxed.release()
         self._tighten(False)
         self.waiting = self.moving
         kept, state = scene_run.ledger.kept, self.state

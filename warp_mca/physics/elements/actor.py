@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from warp_mca.base.errors import RequestError
 from warp_mca.physics.elements import ELEMENTS
 from warp_mca.physics.elements.stage import BLOCK_DIM, ElementStage
 from warp_mca.physics.elements.state import ElementState
@@ -14,6 +15,21 @@ from warp_mca.system.stage import SUMS, Stage, Step
 
 if TYPE_CHECKING:
     from warp_mca.system.actor import System
+    from warp_mca.system.block import Block
+    from warp_mca.system.model import Model
+
+
+def _stage(model: Model, block: Block, precision: str) -> ElementStage:
+    """The stage of a block.
+
+    Raises:
+        RequestError: the element does not take the law; it names the body of the first one.
+    """
+    try:
+        return ELEMENTS[block.element].stage(block, model.X, precision)
+    except RequestError as error:
+        body, _ = model.owner(int(model.element_of[block.first]))
+        raise RequestError(str(error).replace("Body.", f"Body {body}.", 1)) from error
 
 
 class Elements(list[ElementStage], Actor):
@@ -24,7 +40,7 @@ class Elements(list[ElementStage], Actor):
     def __init__(self, solver: System) -> None:
         """Allocate on the current device."""
         model = solver.model
-        super().__init__(ELEMENTS[block.element].stage(block, model.X, solver.precision) for block in model.blocks)
+        super().__init__(_stage(model, block, solver.precision) for block in model.blocks)
         self.solver = solver
         for index, stage in enumerate(self):
             if stage.failing:
