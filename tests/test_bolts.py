@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from impacts import begun, finished, momentum, result_of
+from impacts import begun, finished, momentum, prepared, result_of
 
 import warp_mca as mca
-from warp_mca.physics.loads.bolts import truss
+from warp_mca.physics.loads.bolts import BoltNodes, truss
 
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7800.0)
 SIDE, L, D = 0.01, 0.02, 0.004
@@ -77,6 +77,7 @@ def test_two_rigid_blocks_swing_on_it():
     assert np.abs(result["bolt_bolt1_shear_N"]).max() < 1e-6 * EA / L * v / w
     assert np.abs(result["E_spring"] - 0.5 * force**2 * L / EA).max() < 4e-3 * 0.25 * MASS
     assert momentum(impact)[2] == pytest.approx(MASS * v, rel=1e-9)
+    assert any("bolt bolt1 bore a compression of" in text for text in result.warnings)
     told = result.summary["bolts"]["bolt1"]
     assert told["max_force"]["value"] == result["bolt_bolt1_N"].max()
     assert told["min_force"]["time"] == result.time[result["bolt_bolt1_N"].argmin()]
@@ -259,3 +260,19 @@ def test_an_end_without_nodes_near_is_refused():
         clamped(bodies=(replace(PLATE, velocity=(0.0, 0.0, 1.0)), LID))
     with pytest.raises(mca.RequestError, match="bolt"):
         clamped(loads=(SCREW, SCREW))
+
+
+def test_without_a_reach_an_end_takes_the_cell_around_it_where_cells_are_coarse():
+    """Cells are 3.3 mm wide and 2 mm high, the shank is 0.1 mm thick."""
+    thin = replace(SCREW, diameter=1e-4, at=(1.5e-3, 1.5e-3, -0.8e-3), other_at=(1.5e-3, 1.5e-3, -3.2e-3))
+    parts = prepared(clamped(loads=(thin,)))
+    (bolt,) = parts.model.loads["Bolt"]
+    assert isinstance(bolt, BoltNodes)
+    bar, w = bolt.bars[0], 0.02 / 6.0
+    held = parts.model.X[bar.node[: bar.middle]]
+    assert sorted(map(tuple, held.round(9))) == [
+        pytest.approx((x, y, z), abs=1e-8) for x in (0.0, w) for y in (0.0, w) for z in (2e-3, 4e-3)
+    ]
+    assert bar.weight[: bar.middle].sum() == pytest.approx(1.0)
+    with pytest.raises(mca.RequestError, match="0 nodes of lid within reach"):
+        begun(clamped(loads=(replace(thin, at=(0.0, 0.0, 0.1)),)))

@@ -60,6 +60,21 @@ def test_the_picture_stands_upright_on_its_floor(file: Path):
     picture.close()
 
 
+def test_a_section_keeps_what_is_behind_its_plane(file: Path):
+    pytest.importorskip("pyvista")
+    middle = (0.05, 0.0, 0.0)
+    cuts = (None, (middle, (1.0, 0.0, 0.0)), (middle, (-2.0, 0.0, 0.0)))
+    pictures = [plotter(file, time=0.0, field="velocity", cut=cut, off_screen=True) for cut in cuts]
+    whole, low, high = (picture.actors["bodies"].mapper.dataset for picture in pictures)
+    assert low.bounds[1] == pytest.approx(0.05) == pytest.approx(high.bounds[0])
+    assert (low.bounds[0], high.bounds[1]) == pytest.approx((whole.bounds[0], whole.bounds[1]))
+    np.testing.assert_allclose(np.asarray(low.point_data["speed [m/s]"]), 3.0, rtol=1e-6)
+    section = np.asarray(low.points)[np.abs(np.asarray(low.points)[:, 0] - 0.05) < 1e-6]
+    assert len(section) >= 8  # corners of two bars
+    for picture in pictures:
+        picture.close()
+
+
 def test_a_recording_of_one_frame_is_drawn_at_its_time(tmp_path: Path, bars: FlyingBars):
     pytest.importorskip("pyvista")
     recorder = VtkHdfFile(tmp_path / "one.vtkhdf", cadence=Cadence(times=(2e-6,)))
@@ -95,9 +110,14 @@ def test_stress_is_in_the_units_and_colours_of_other_pictures(file: Path):
     [
         ({"field": "heat"}, "field = 'heat': choose one of"),
         ({"magnify": -1.0}, "magnify = -1.0: give a factor above 0"),
+        ({"cut": (1.0, 2.0, 3.0)}, "give a point and a normal"),
+        ({"cut": ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))}, "plotter.cut"),
+        ({"cut": ((-9.0, 0.0, 0.0), (1.0, 0.0, 0.0))}, "nothing is left to show"),
     ],
 )
 def test_what_cannot_be_drawn_is_refused(file: Path, options: dict, why: str):
+    if "cut" in options:
+        pytest.importorskip("pyvista")
     with pytest.raises(RequestError, match=why):
         plotter(file, **options)
 

@@ -28,6 +28,7 @@ from warp_mca.verify.body_joints import pendulum_chain
 from warp_mca.watch import (
     articulations,
     bending,
+    bolts,
     contacts,
     elements,
     energy,
@@ -570,6 +571,14 @@ def _(beyond: bool) -> list[str]:
         object.__setattr__(case, name, value)
     kept = {"passed": np.array([[1e-3 if beyond else 0.0, 1e-4, 0.0, 0.0, 0.0, 0.0]])}
     return told(passing.body_in_itself, watch=SimpleNamespace(cases=[case]), ledger=ledger(kept), origin=0.0)
+
+
+@pair(bolts.bolt_in_compression)
+def bolt_in_compression(beyond: bool) -> list[str]:
+    screw = mca.Bolt(name="screw", body="a", at=(0.0,) * 3, other="b", other_at=(0.0, 0.0, 1.0), diameter=1e-3)
+    least = -100.0 * over(bolts.bolt_in_compression, beyond)
+    columns = {"bolt_screw_N": np.array([0.0, 50.0, least]), "bolt_screw_shear_N": np.array([0.0, 100.0, 0.0])}
+    return told(bolts.bolt_in_compression, scene=SimpleNamespace(loads=(screw,)), history=columns)
 
 
 @pair(histories.no_contact)

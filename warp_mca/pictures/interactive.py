@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import RequestError, bad_value
-from warp_mca.base.validate import brief, is_number, kind_of
+from warp_mca.base.validate import brief, directions, is_number, kind_of, vectors
 from warp_mca.pictures.magnify import magnified
 from warp_mca.pictures.setting import VIEW, View, eye_axes, plane_mesh
 from warp_mca.pictures.snapshot import FIELDS
 from warp_mca.results.figure_style import engineering
 from warp_mca.scene import RigidPlane
+from warp_mca.scene.bodies import Vec3
 
 BAR: dict[str, Any] = {  # beside the bodies
     **{"vertical": True, "position_x": 0.84, "position_y": 0.2, "height": 0.6},
@@ -34,6 +35,7 @@ def plotter(
     field: str = "von_mises",
     magnify: float = 1.0,
     view: View = VIEW,
+    cut: tuple[Vec3, Vec3] | None = None,
     **options: Any,
 ) -> pyvista.Plotter:
     """A scene of pyvista with the bodies of a recording and the rigid planes; `.show()` opens it.
@@ -44,6 +46,8 @@ def plotter(
         field: that colours it: von_mises, plastic_strain, displacement or velocity.
         magnify: of the motion of nodes less the rigid motion of their body that is nearest to it.
         view: size, camera and hidden bodies.
+        cut: a point [m] and a normal of a plane through the bodies as shown; what lies on the normal's side is left
+            out.
         options: of `pyvista.Plotter`, such as off_screen=True.
 
     Raises:
@@ -65,9 +69,10 @@ def plotter(
     points = _places(mesh, magnify)
     mesh.points = points
     title, colours, limit = _coloured(mesh, field)
+    shown = mesh if cut is None else _section(mesh, cut)
     look: dict[str, Any] = {"cmap": colours, "clim": (0.0, limit or 1.0), "scalar_bar_args": BAR}
     look |= {"split_sharp_edges": True, "smooth_shading": True}
-    found.add_mesh(mesh, name="bodies", scalars=title, **look)
+    found.add_mesh(shown, name="bodies", scalars=title, **look)
     up = np.asarray(mesh.field_data["up"], dtype=float).ravel()
     for k, plane in enumerate(_planes(mesh, points, up)):
         squares = pv.PolyData.from_regular_faces(plane.points + plane.shift(at), plane.quads)
@@ -94,6 +99,23 @@ def _coloured(mesh: pyvista.DataSet, field: str) -> tuple[str, Any, float]:
     title = f"{kind.words} [{unit or '-'}]"
     mesh.point_data[title] = scale * value
     return title, ListedColormap(colormaps["viridis"](np.linspace(0.0, 1.0, 256) ** kind.power)), scale * limit
+
+
+def _section(mesh: pyvista.DataSet, cut: tuple[Vec3, Vec3]) -> pyvista.DataSet:
+    """The mesh behind a plane, with values on the section.
+
+    Raises:
+        RequestError: it is no plane, or nothing is behind it.
+    """
+    if not (isinstance(cut, tuple | list) and len(cut) == 2):
+        raise bad_value("cut", brief(cut), "give a point and a normal, as ((0, 0, 0), (0, 1, 0))")
+    point, normal = cut
+    vectors("plotter", cut=point)
+    directions("plotter", cut=normal)
+    kept = mesh.clip(normal=normal, origin=point)  # pyright: ignore[reportCallIssue]
+    if not kept.n_cells:
+        raise bad_value("cut", cut, "nothing is left to show; turn the normal, or move the point into the bodies")
+    return kept
 
 
 def _without(mesh: pyvista.DataSet, path: Path, view: View) -> pyvista.DataSet:

@@ -37,7 +37,8 @@ class Bolt(Load):
         preload: tension before the impact [N].
         E: Young's modulus [Pa].
         nu: Poisson's ratio [-].
-        reach: distance from each end within which nodes hold it [m], as the radius of its head; None takes `diameter`.
+        reach: distance from each end within which nodes hold it [m], as the radius of its head; None takes `diameter`,
+            or the nodes of the cell around the end where these are too few.
     """
 
     name: str

@@ -11,6 +11,7 @@ import numpy as np
 from warp_mca.watch import (
     articulations,
     bending,
+    bolts,
     contacts,
     elements,
     energy,
@@ -37,7 +38,7 @@ def _rows(*modules: ModuleType) -> tuple[Row, ...]:
     return tuple(item for module in modules for item in vars(module).values() if isinstance(item, Row))
 
 
-FIGURES = _rows(elements, inertia, bending, folding, energy, contacts, motion)
+FIGURES = _rows(elements, inertia, bending, folding, energy, contacts, motion, bolts)
 SCENES = _rows(meshes, units, articulations)
 EVENTS = _rows(passing, histories, vibration)
 TABLE = (*_rows(guards), *FIGURES, *SCENES, *EVENTS)

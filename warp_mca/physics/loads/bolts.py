@@ -132,17 +132,43 @@ def _end(assembly: Bodies, load: Bolt, key: str, body: str, place: Array, ring: 
     reach = _reach(load)
     if not assembly.scene.body(body).rigid:
         part = part[np.linalg.norm(assembly.X[part] - place, axis=1) <= reach]
+        if load.reach is None and not _spans(assembly, part):
+            part = _cell_around(assembly, body, place)
     part = part[assembly.mass[part] > 0.0]
     X, mass = assembly.X[part], assembly.mass[part]
     offset = X - mass @ X / mass.sum() if len(part) else X
-    spread = np.linalg.svd(offset, compute_uv=False) if len(part) > 2 else np.zeros(3)
-    if spread[1] <= FLAT * spread[0]:
+    if not _spans(assembly, part):
         what = f"{len(part)} nodes of {body} within reach = {reach:g} m of it, where three that span a face are needed"
         remedy = "put it into the body, or give a greater reach or finer cells there"
         raise bad_value(f"{load.title}.{key}", getattr(load, key), f"{what}; {remedy}")
     inverse = np.linalg.pinv(np.einsum("n,ni,nj->ij", mass, offset, offset), rcond=FLAT**2, hermitian=True)
     corner = place + ring - mass @ X / mass.sum()
     return part, mass * (1.0 / mass.sum() + corner @ inverse @ offset.T)
+
+
+def _spans(assembly: Bodies, part: Index) -> bool:
+    """Whether nodes span a face."""
+    part = part[assembly.mass[part] > 0.0]
+    if len(part) < 3:
+        return False
+    X, mass = assembly.X[part], assembly.mass[part]
+    spread = np.linalg.svd(X - mass @ X / mass.sum(), compute_uv=False)
+    return bool(spread[1] > FLAT * spread[0])
+
+
+def _cell_around(assembly: Bodies, body: str, place: Array) -> Index:
+    """Nodes of the cell of a body whose middle is nearest to a place, within the ball around its nodes; none beyond."""
+    start, best, found = assembly.node_start[body], np.inf, np.zeros(0, np.int32)
+    for cells in assembly.meshes[body].cells.values():
+        if not len(cells):
+            continue
+        corner = assembly.X[cells + start]
+        middle = corner.mean(axis=1)
+        away = np.linalg.norm(middle - place, axis=1)
+        k = int(away.argmin())
+        if away[k] < best and away[k] <= np.linalg.norm(corner[k] - middle[k], axis=1).max():
+            best, found = float(away[k]), np.unique(cells[k] + start).astype(np.int32)
+    return found
 
 
 def _bar(assembly: Bodies, load: Bolt, own: Truss, ends: list[End], i: int, j: int) -> SpringNodes:
