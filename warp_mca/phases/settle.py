@@ -58,9 +58,11 @@ def settle(phase: Settle, impact: Impact, tell: Callable[[float], None]) -> Stre
     passed = short = False
     while quiet <= max(reached, quarter) or state.steps * fine.dt < motion.rise:
         if state.steps >= steps.count - STEPS:
+            just = "fell below the tolerance only just before"
+            left = just if quiet else f"is still {kinetic / greatest:.2g} of its most"
             raise GuardError(
-                f"bodies do not rest after Settle.duration = {phase.duration:g} s: their kinetic energy is still "
-                f"{kinetic / greatest:.2g} of its greatest value; give a longer duration, or hold what falls"
+                f"bodies do not rest after Settle.duration = {phase.duration:g} s: their kinetic energy {left}; give a "
+                "longer duration, or hold what falls"
             )
         wanted = max(1, min(STEPS, state.steps // LOOKS), quarter // LOOKS)
         wanted, short = max(1, int(SHORT * wanted)) if short else wanted, not short
