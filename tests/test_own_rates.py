@@ -169,5 +169,5 @@ def test_a_bar_flows_where_it_strikes_a_rigid_block(device: str, tmp_path: Path)
 
 
 def test_an_element_with_nodal_pressure_is_refused():
-    with pytest.raises(mca.RequestError, match=r"Body\.element = 'tet4': its law gives the pressure"):
+    with pytest.raises(mca.RequestError, match=r"Body bar\.element = 'tet4': its material gives the pressure"):
         mca.run(bar("tet4"))
