@@ -179,8 +179,8 @@ def stiffness(body: Imposed) -> csc_matrix:
 class Statics:
     """Equilibrium of a body, of which components of the displacement are held or given.
 
-    The stiffness is measured on the CPU in float64. On another device or in mixed precision, displacements are then
-    corrected until the forces there balance the load: a stiffness measured in float32 is too coarse for slender bodies.
+    The stiffness is measured on the CPU in float64: one measured in float32 is too coarse for slender bodies.
+    Displacements are then corrected until the forces, on the device and in the precision asked for, balance the load.
 
     Attributes:
         body: on the device and in the precision asked for.
@@ -203,9 +203,8 @@ class Statics:
         self.body = Imposed(setup, geometry, material, kinematics)
         self.frames = axes(self.body.X) if axes else None
         self._factored: tuple[Index, Callable[[Array], Array]] | None = None
-        self.exact = (setup.device, setup.precision) == ("cpu", "float64")
         double = replace(setup, device="cpu", precision="float64")
-        self.K = stiffness(self.body if self.exact else Imposed(double, geometry, material, kinematics))
+        self.K = stiffness(self.body if setup == double else Imposed(double, geometry, material, kinematics))
         if self.frames is not None:
             turn = block_diag(self.frames)
             self.K = (turn.T @ self.K @ turn).tocsc()
@@ -240,7 +239,7 @@ class Statics:
         u = np.zeros(held.shape) if given is None else np.where(held, given, 0.0)
         u = u + self._correction(held, load - (self.K @ u.ravel()).reshape(-1, 3))
         scale = SMALL * self.body.shortest / np.abs(u).max()
-        for _ in range(0 if self.exact else 3):
+        for _ in range(3):
             u = u + self._correction(held, load + self._forces(scale * u) / scale)
         return u
 
