@@ -106,6 +106,22 @@ REFUSED = [
 ]
 
 
+@pytest.mark.parametrize("onto", ["rigid", "wood"])
+def test_the_force_is_that_of_the_floor(onto: str):
+    """It takes the momentum of parts on each other, whose contact bears a force as great; in any step, too."""
+    low, high = (
+        mca.Box(size=(0.02, 0.02, 0.01), divisions=(n, n, 2), origin=(0.0, 0.0, z)) for n, z in ((4, 0), (3, 0.01))
+    )
+    parts = [mca.Body(name=name, geometry=box, material=STEEL) for name, box in (("low", low), ("high", high))]
+    impact = mca.ImpactPhase(duration=1e-5, output_interval=1e-7)
+    scene = mca.drop_test(parts, height=0.5, onto=onto, contacts=(mca.ContactAll(),), impact=impact)
+    result = mca.run(scene, figures="none")
+    among, floor, *_ = result.contacts
+    assert floor.name.startswith("low") and among.pressure.max() > 0.3 * floor.pressure.max()
+    np.testing.assert_allclose(result.F_n, floor.pressure, atol=1e-4 * result.F_n.max())
+    assert result.summary["extremes"]["F_n_max"] == pytest.approx(result.F_n.max(), rel=0.02)
+
+
 @pytest.mark.parametrize("number", range(len(REFUSED)))
 def test_what_no_drop_can_mean_is_refused(number: int):
     changes, words = REFUSED[number]

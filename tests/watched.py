@@ -64,7 +64,8 @@ def of_contacts(
 
     `held`: of the slave's nodes of the first contact, the axes along which they are fixed as bits.
     """
-    passes = [SimpleNamespace(contact=0, sign=1.0, leads=True, bonds=None, slave=np.arange(len(held)))] if held else []
+    own = SimpleNamespace(contact=0, sign=1.0, leads=True, bonds=None, internal=False, slave=np.arange(len(held)))
+    passes = [own] if held else []
     axes = np.zeros((len(contacts), 2, 3)) if axes is None else axes
     model = SimpleNamespace(contact_axes=axes, passes=passes, fixed_axes=np.array(held, dtype=np.int32))
     rows = [row for row in vars(histories).values() if isinstance(row, Row)]

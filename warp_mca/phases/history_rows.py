@@ -110,7 +110,8 @@ def history_columns(ledger: Ledger, first: int = 0) -> dict[str, Array]:
     """
     model, steps, kept = ledger.model, ledger.steps, ledger.kept
     table, energy = ledger.table(first), ledger.energies(first)
-    F_n, F_t, stick = _forces(ledger, ledger.springs(table))
+    counted = [k for k, item in enumerate(model.passes) if not item.internal]
+    F_n, F_t, stick = _forces(ledger, ledger.springs(table), counted)
     velocity = np.array(kept.velocities[first:]).reshape(-1, len(model.points), 3)
     velocity[:, model.points < 0] = np.nan
     if model.points[1] < 0 and model.passes and model.passes[0].plane is not None:
@@ -134,7 +135,7 @@ def history_columns(ledger: Ledger, first: int = 0) -> dict[str, Array]:
         "tip_vz": velocity[:, 0, 2],
         "plate_vy": velocity[:, 1, 1],
         "plate_vz": velocity[:, 1, 2],
-        "closing_speed": _closing_speed(ledger, first),
+        "closing_speed": _closing_speed(ledger, first, counted),
     }
     for own in added_columns(model).values():
         begin = own.first + len(own.energies)
@@ -147,19 +148,19 @@ def history_columns(ledger: Ledger, first: int = 0) -> dict[str, Array]:
     return columns | {f"E_{name}": energy[name] for name in sorted(added)}
 
 
-def _forces(ledger: Ledger, springs: Array) -> tuple[Array, Array, Array]:
+def _forces(ledger: Ledger, springs: Array, passes: Sequence[int]) -> tuple[Array, Array, Array]:
     """Normal and tangential force [N] and the share of the normal force that sticks [-], each shape (row_count,).
 
-    `springs` are the columns of each row and contact pass, shape (row_count, pass_count, PASS_COLUMNS).
+    `springs` are the columns of each row and contact pass, shape (row_count, pass_count, PASS_COLUMNS); `passes` count.
     """
     model, share = ledger.model, ledger.contact_dt / ledger.steps.interval
     F_n, F_t, stick = np.zeros(len(springs)), np.zeros(len(springs)), np.zeros(len(springs))
-    for k, item in enumerate(model.passes):
+    for k, item in ((k, model.passes[k]) for k in passes):
         force = share * item.sign * springs[:, k, IMPULSE]
         normal, tangent = model.contact_axes[item.contact]
         F_n += force @ normal if normal.any() else share * springs[:, k, NORMAL_IMPULSE]  # see `Model.contact_axes`
         F_t += force @ tangent
-    pressed, stuck = springs[:, :, NORMAL_IMPULSE].sum(axis=1), springs[:, :, STICK_IMPULSE].sum(axis=1)
+    pressed, stuck = (springs[:, passes, column].sum(axis=1) for column in (NORMAL_IMPULSE, STICK_IMPULSE))
     np.divide(stuck, pressed, out=stick, where=pressed > 0.0)
     return F_n, F_t, stick
 
@@ -184,7 +185,7 @@ def contact_histories(ledger: Ledger, names: Sequence[str]) -> tuple[ContactHist
     return tuple(found)
 
 
-def _closing_speed(ledger: Ledger, first: int, passes: Sequence[int] | slice = slice(None)) -> Array:
+def _closing_speed(ledger: Ledger, first: int, passes: Sequence[int]) -> Array:
     """As in `ContactHistory`, of some passes, from row `first` on.
 
     Normal forces do the work dE = sum(F_n v dt) on their springs. So the gain of these in an interval, over the normal

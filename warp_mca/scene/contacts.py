@@ -65,6 +65,7 @@ class _Springs:
     name: str | None
     law: ContactLaw | None
     friction: FrictionLaw | tuple[FrictionLaw, ...]
+    internal: bool
 
     def _check_springs(self) -> None:
         owner = type(self).__name__
@@ -72,6 +73,7 @@ class _Springs:
         if self.law is not None and type(self.law) not in CONTACT_LAWS.values():  # others are not registered
             remedy = f"give a {' or a '.join(CONTACT_LAWS)}; register other classes by warp_mca.register"
             raise bad_value(f"{owner}.law", validate.brief(self.law), remedy)
+        validate.flags(owner, internal=self.internal)
         if isinstance(self.penalty, str):
             if self.penalty != "auto":
                 raise bad_value(f"{owner}.penalty", self.penalty, "give a finite number above 0, auto or None")
@@ -132,6 +134,7 @@ class Contact(_Springs):
         tangent: direction that F_t_N reports [-], made perpendicular to the normal. None takes normal x z, or the
             perpendicular nearest to +x where the normal is within 20 degrees of the z axis.
         bond: glue between the surfaces, which hold each other until it fails. Tension is a negative F_n_N.
+        internal: between parts of one thing, as in `drop_test`: F_n_N and what is read off it leave its forces out.
     """
 
     slave: Surface
@@ -147,6 +150,7 @@ class Contact(_Springs):
     friction: FrictionLaw | tuple[FrictionLaw, ...] = ()
     bond: Bond | None = None
     stiffness: float | None = None
+    internal: bool = False
 
     def __post_init__(self) -> None:
         self._check_springs()
@@ -200,7 +204,7 @@ class ContactAll(_Springs):
     `Contact` where these shall meet. Rigid planes are always listed.
 
     Attributes:
-        mu, law, friction, initial_overlap: as in `Contact`, for all pairs.
+        mu, law, friction, initial_overlap, internal: as in `Contact`, for all pairs.
         penalty: as in `Contact`, though not "auto".
         exclude: pairs of bodies that are not kept apart; a body paired with itself has no self-contact.
         self_contact: whether bodies are kept out of themselves; rigid ones cannot fold.
@@ -215,6 +219,7 @@ class ContactAll(_Springs):
     name: str | None = None
     law: ContactLaw | None = None
     friction: FrictionLaw | tuple[FrictionLaw, ...] = ()
+    internal: bool = False
 
     def __post_init__(self) -> None:
         self._check_springs()

@@ -72,7 +72,7 @@ def drop_test(
         onto: "rigid", or a floor of "steel", "concrete" or "wood" (`mca.library` has their source): an elastic block
             whose other sides let waves out, with 20 cells over 1.25 times the diagonal of the parts.
         mu: coefficient of friction on the floor [-].
-        contacts: of the bodies with each other.
+        contacts: of the bodies with each other; they become `internal`, so that F_n is the floor's.
         gravity: g [m/s^2].
         impact: phase of the impact; None runs for 20 passes of a wave in metal along the diagonal of the parts, with
             400 intervals.
@@ -135,10 +135,10 @@ def _contacts(
     """The contacts of the bodies with each other, and of each with the floor, which has none with itself."""
     master = Surface(body="floor", nodes="zmax") if floor else RigidPlane(normal=(0.0, 0.0, 1.0))
     skins = [Surface(body=body.name, nodes="boundary") for body in bodies if not body.is_inertia]
-    among = [
-        replace(c, exclude=(*c.exclude, ("floor", "floor"))) if floor and isinstance(c, ContactAll) else c
-        for c in contacts
-    ]
+    among = [replace(c, internal=True) for c in contacts]
+    if floor:
+        itself = ("floor", "floor")
+        among = [replace(c, exclude=(*c.exclude, itself)) if isinstance(c, ContactAll) else c for c in among]
     return (*among, *(Contact(slave=skin, master=master, mu=mu) for skin in skins))
 
 

@@ -103,7 +103,7 @@ class ContactPass:
         curved: whether one of its surfaces is; a plane is not.
         room: slave nodes that the list of a face holds.
         deepest: penetration of a plane that stops the run [m]; faces have half their own size.
-        initial_overlap: as in `Contact`.
+        initial_overlap, internal: as in `Contact`.
         pairs: bodies of a general contact, or None.
         bonds: that glue its slave nodes, or None.
     """
@@ -136,6 +136,7 @@ class ContactPass:
     room: int = field(default=LIST_LENGTH, metadata=AS_IS)
     deepest: float = field(default=0.0, metadata=AS_IS)
     initial_overlap: str = field(default="refuse", metadata=AS_IS)
+    internal: bool = field(default=False, metadata=AS_IS)
     pairs: Pairs | None = field(default=None, metadata=AS_IS)
     bonds: BondedNodes | None = field(default=None, metadata=AS_IS)
 

@@ -79,7 +79,7 @@ def grazing_touch(c: Finished, least: float) -> Iterator[Values]:
 )
 def normal_off_its_axis(c: Finished, most: float) -> Iterator[Values]:
     """Angle between each contact's normal and the axis of F_n; of closed masters, to the plane across that of F_t."""
-    for contact, (normal, tangent) in zip(c.contacts, c.model.contact_axes, strict=True):
+    for _, contact, normal, tangent in _reported(c):
         angle = _off_axis(contact, normal, tangent)
         if contact.normal is None or angle <= most:
             continue
@@ -97,7 +97,7 @@ def normal_off_its_axis(c: Finished, most: float) -> Iterator[Values]:
 def friction_across_the_tangent(c: Finished, most: float) -> Iterator[Values]:
     """Friction of each contact across the axis of F_t, without what symmetry cancels or pressure gives there."""
     symmetry = symmetry_of(c.model)
-    for k, (contact, (normal, tangent)) in enumerate(zip(c.contacts, c.model.contact_axes, strict=True)):
+    for k, contact, normal, tangent in _reported(c):
         if contact.normal is None or _off_axis(contact, normal, tangent) > OFF_AXIS:
             continue
         side = np.cross(contact.normal, tangent)
@@ -107,6 +107,14 @@ def friction_across_the_tangent(c: Finished, most: float) -> Iterator[Values]:
         across -= np.abs(contact.normal_force @ side).sum()
         if across > max(most * along, ACROSS * contact.pressure.sum()):
             yield dict(name=contact.name, seen=_listed(side + 0.0), axis=_listed(tangent + 0.0))
+
+
+def _reported(c: Finished) -> Iterator[tuple[int, ContactHistory, Array, Array]]:
+    """Contacts that F_n_N and F_t_N count: their place, and their axes, each shape (3,)."""
+    internal = {item.contact for item in c.model.passes if item.internal}
+    for k, (contact, axes) in enumerate(zip(c.contacts, c.model.contact_axes, strict=True)):
+        if k not in internal:
+            yield k, contact, *axes
 
 
 def _loose(c: Finished) -> list[ContactHistory]:

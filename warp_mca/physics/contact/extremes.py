@@ -8,6 +8,7 @@ from typing import Any
 
 import warp as wp
 
+from warp_mca.physics.contact.per_scene import numbers
 from warp_mca.system.contact import ContactPass
 from warp_mca.system.reading import on_host
 from warp_mca.system.threads import RANGES
@@ -19,18 +20,20 @@ _LINE = 8  # numbers in a line of a CPU's cache: two threads that write to one w
 
 
 class NormalForce:
-    """How normal forces of all springs of a step are summed for each scene: `State.normal_force` holds the sums.
-
-    Attributes:
-        per_newton: what the sums count for a newton [1/N], a power of two; see `kernels.hardware.per_scene`.
-    """
+    """How normal forces of all springs of a step are summed for each scene: `State.normal_force` holds the sums."""
 
     def __init__(self, scenes: Sequence[Sequence[ContactPass]], threads: int) -> None:
         """For the passes of each scene, none where no scene has contact, and for as many threads of a CPU."""
         ranges = RANGES * threads if threads > 1 else 1
         self._shape = (1 + ranges if scenes else 0, -(-len(scenes) // _LINE) * _LINE)
         self._scales = [_scale(passes) for passes in scenes]
-        self.per_newton: Any = self._scales[0] if len(scenes) == 1 else wp.array(self._scales, dtype=wp.float64)
+
+    def per_newton(self, items: Sequence[ContactPass]) -> Any:
+        """What the sums count for a newton in a pass of each scene [1/N]: a power of two, or 0 of internal contacts.
+
+        See `kernels.hardware.per_scene`.
+        """
+        return numbers([0.0 if item.internal else scale for item, scale in zip(items, self._scales, strict=True)])
 
     def new_state(self) -> wp.array:
         """The greatest sum of any step, then a row of sums of the present step for each range of slaves.

@@ -73,7 +73,7 @@ class ContactStage:
     def _begin(self, items: Sequence[ContactPass], model: Model, index: int, normal_force: NormalForce) -> None:
         """What springs need, whatever presses them."""
         self.items, self.index, self.column = items, index, PASS + PASS_COLUMNS * index
-        self.per_newton, self.node_count = normal_force.per_newton, model.node_count
+        self.per_newton, self.node_count = normal_force.per_newton(items), model.node_count
         self.each, self.slots = len(items) > 1, None
         self.sides = max(item.sides for item in items)
         self.noted = has_sides(model)

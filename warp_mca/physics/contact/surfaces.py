@@ -119,6 +119,7 @@ def surface_pass(
         curved=not is_flat(slave, master),
         room=_room(slave, master, margin),
         initial_overlap=contact.initial_overlap,
+        internal=contact.internal,
     )
 
 
@@ -150,6 +151,7 @@ def contact_passes(
                 deepest=deepest,
                 curved=not is_flat(slave, None),
                 initial_overlap=contact.initial_overlap,
+                internal=contact.internal,
             )
         ]
     passes = [surface_pass(contact, index, slave, master, own[0], other[0][1], 1.0)]
