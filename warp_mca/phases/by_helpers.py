@@ -16,6 +16,7 @@ from warp_mca.phases.meshing import made_of
 from warp_mca.phases.prepare import Prepared, Request, prepare
 from warp_mca.phases.settings import Settings
 from warp_mca.scene import Scene
+from warp_mca.watch.passing import skins_of
 from warp_mca.watch.row import Finished
 from warp_mca.watch.table import told_at_the_end
 
@@ -105,7 +106,8 @@ def prepare_one(scene: bytes, made: dict[object, Mesh], span: float, settings: S
     """What a helper does: a pickled scene at the start of its impact phase, and wall time by stage [s]."""
     request = Request(span=span, settings=settings)
     with unchanged():
-        return prepare(pickle.loads(scene), None, request, made), request.clock.wall
+        ready = prepare(pickle.loads(scene), None, request, made)
+        return replace(ready, skins=skins_of(ready.scene, ready.meshes, ready.model)), request.clock.wall
 
 
 def told(finished: Sequence[Finished], before: Sequence[Sequence[str]], threads: int) -> list[tuple[str, ...]]:

@@ -107,7 +107,7 @@ class Impact:
         self.exposed = Exposed(self.ready[0], self.solver, self.state) if model.fails and len(ready) == 1 else None
         self.stopped: list[str | None] = [None] * len(self.ready)
         self.recording: Recording | None = None
-        self._watches = [Watch(item.scene, item.meshes, item.model, self.solver.dt, span) for item in ready]
+        self._watches = [Watch(item.scene, item.meshes, item.model, self.solver.dt, span, item.skins) for item in ready]
         self._begin_scenes()
 
     def _begin_scenes(self) -> None:

@@ -18,7 +18,7 @@ BLUE, VERMILION, BLACK = "#0072B2", "#D55E00", "#222222"
 GREEN, SKY, ORANGE, PURPLE = "#009E73", "#56B4E9", "#E69F00", "#CC79A7"
 STICK = "#F0E442"
 DOTS_PER_INCH = 200
-LABEL = 0.25  # from the left edge of a figure to the labels of y axes [inch]
+LABEL = 0.18  # from the left edge of a figure to the labels of y axes [inch]
 FIGURES = ("png", "none")  # what a run draws
 
 
@@ -47,7 +47,7 @@ def place(
     figure: Figure,
     panels: Sequence[Axes],
     *,
-    left: float = 0.75,
+    left: float = 0.9,
     right: float = 0.2,
     top: float = 0.3,
     bottom: float = 0.55,
