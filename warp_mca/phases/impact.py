@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,8 +29,10 @@ from warp_mca.step.sensor_stage import SensorStage
 from warp_mca.step.solver import Solver
 from warp_mca.step.state_figures import at_last_record
 from warp_mca.step.steps import Steps
+from warp_mca.system.reading import on_host
 from warp_mca.system.records import SceneRecords
 from warp_mca.system.state import State
+from warp_mca.watch.bent_scenes import Together
 from warp_mca.watch.passing import Watch
 
 if TYPE_CHECKING:
@@ -85,7 +88,7 @@ class Impact:
         """
         alike = with_alike_passes([item.model for item in ready])
         ready = [replace(item, model=model) for item, model in zip(ready, alike, strict=True)]
-        self.ready = tuple(ready)
+        self.ready, self._threads = tuple(ready), threads
         self.steps = divide_alike([(item.scene, item.model) for item in ready], span)
         model = join_models([item.model for item in ready])
         model = with_floating_frames(model, [item.scene for item in ready], span, precision)
@@ -109,6 +112,20 @@ class Impact:
         self.recording: Recording | None = None
         self._watches = [Watch(item.scene, item.meshes, item.model, self.solver.dt, span, item.skins) for item in ready]
         self._begin_scenes()
+
+    @cached_property
+    def together(self) -> Together:
+        """Cells of several scenes whose bending is looked at."""
+        return Together([(item.ledger.model, item.looks.samples) for item in self.scene_runs], self._threads)
+
+    def look_at_the_end(self) -> None:
+        """Look at the bending of all scenes of a batch, for their results; a lone one looks itself."""
+        looks = [item.looks for item in self.scene_runs]
+        if len(looks) > 1 and any(item.samples for item in looks):
+            before = [item.ledger.kept.stiffened for item in looks]
+            u = np.asarray(on_host(self.state.u), dtype=np.float64)
+            for item, found in zip(looks, self.together.seen(u, before), strict=True):
+                item.last = found
 
     def _begin_scenes(self) -> None:
         first = offsets([len(item.probes.corner) for item in self.ready])
