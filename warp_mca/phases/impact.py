@@ -44,6 +44,7 @@ if TYPE_CHECKING:
 
 
 Array = NDArray[np.float64]
+SETS = 5  # of records that the scenes of a batch take in at once, at most
 
 
 class Impact:
@@ -110,6 +111,8 @@ class Impact:
         self.exposed = Exposed(self.ready[0], self.solver, self.state) if model.fails and len(ready) == 1 else None
         self.stopped: list[str | None] = [None] * len(self.ready)
         self.recording: Recording | None = None
+        self._held: list[dict[str, NDArray]] = []
+        self._sets = 1  # so that scenes that break at once end the run at once
         self._watches = [Watch(item.scene, item.meshes, item.model, self.solver.dt, span, item.skins) for item in ready]
         self._begin_scenes()
 
@@ -206,11 +209,32 @@ class Impact:
         return at_last_record(self.solver, self.state)
 
     def read(self, written: int, records: Mapping[str, NDArray]) -> None:
-        """Hand records to each scene that no guard has stopped.
+        """Hand records to each scene that no guard has stopped; of a batch, those of several sets at once.
+
+        What a record of a small scene costs is calls of numpy. Flags are told as soon as they are raised.
 
         Raises:
             GuardError: a guard stops the last one.
         """
+        if len(self.scene_runs) == 1:
+            return self._hand_over(written, records)
+        raised = bool(records["flag"][:, :-1].any())
+        if raised:
+            self.read_rest()
+        kept = {name: array.copy() if name == "flag" else array[:written].copy() for name, array in records.items()}
+        self._held.append(kept)
+        if raised or len(self._held) >= self._sets:
+            self._sets = min(self._sets + 1, SETS)
+            self.read_rest()
+
+    def read_rest(self) -> None:
+        """Hand over what is held of a batch; raises as `read`."""
+        held, self._held = self._held, []
+        if held:
+            joined = {name: np.concatenate([item[name] for item in held]) for name in held[0] if name != "flag"}
+            self._hand_over(len(joined["partial"]), joined | {"flag": held[-1]["flag"]})
+
+    def _hand_over(self, written: int, records: Mapping[str, NDArray]) -> None:
         for k, scene_run in enumerate(self.scene_runs):
             if self.stopped[k] is None:
                 try:

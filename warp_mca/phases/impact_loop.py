@@ -53,6 +53,8 @@ class Loop:
             self.impact.recording.catch_up(self._receive_arrived)
         while self.transfer.pending:
             self._receive()
+        self.impact.read_rest()
+        self.told()
 
     def _ends(self, interval: int) -> bool:
         """Whether the phase ends with this row, by what the rows before it say."""
