@@ -199,3 +199,17 @@ def test_a_body_that_nothing_has_strained_keeps_its_shape(held: bool):
     u += 1e-17 * np.random.default_rng(0).standard_normal(u.shape) * (X[:, :1] > 0.0)
     shape = relaxation.settle(u, relaxation.solver.new_state())
     np.testing.assert_allclose(shape.u, u, atol=1e-14)
+
+
+def test_forces_asked_for_again_are_those_of_a_new_search():
+    """Launches are replayed, from the history at the start whatever yielded since, and with other displacements."""
+    beam = mca.Body(name="beam", geometry=mca.Box(size=(0.04, 0.01, 0.01), divisions=(4, 1, 2)), material=metal(0.3))
+    scene = mca.Scene(name="beam", bodies=(beam,), impact=mca.ImpactPhase(duration=1e-6))
+    model, settings = prepared(scene).model, Settings("cpu", "float64", 1)
+    asked = Relaxation(model, settings)
+    moves = 1e-4 * np.random.default_rng(0).normal(size=(3, *model.X.shape))
+    for u in (*moves, moves[0], 0.0 * moves[0], moves[1]):
+        new = Relaxation(model, settings)
+        assert np.array_equal(asked._forces(u), new._forces(u))
+        assert asked._energies()[:2] == new._energies()[:2]
+    assert asked.trial.elements[0].yielded.numpy().any()

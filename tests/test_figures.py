@@ -12,6 +12,7 @@ from warp_mca.pictures.snapshot import Look, Skin, plot_snapshot, save_snapshot
 from warp_mca.recorders.colours import PALETTE, ColourScale, levels, packed
 from warp_mca.results.energy_figure import plot_energies, save_energies
 from warp_mca.results.figure_style import engineering
+from warp_mca.results.force_figure import plot_forces
 from warp_mca.results.path_figures import plot_paths, plot_waves, save_path_figures
 from warp_mca.results.paths import PathHistory
 from warp_mca.results.result import Result
@@ -92,6 +93,20 @@ def test_lines_of_wave_speeds_have_their_slope():
     for line, speed in zip(diagram.lines, speeds.values(), strict=True):
         (t0, t1), (x0, x1) = line.get_xdata(), line.get_ydata()
         assert 1e3 * (x1 - x0) / (t1 - t0) == pytest.approx(speed)
+
+
+@pytest.mark.parametrize("factor", [1.0, -7e-7, 8888.0])
+def test_everything_drawn_is_within_its_figure(factor: float):
+    run = result()
+    names = ("E_absorbed", *(f"{point}_v{axis}" for point in ("tip", "plate") for axis in "xyz"), "closing_speed")
+    ramp = {name: factor * np.linspace(0.5, 1.0, len(TIME)) for name in names}
+    history = {name: column if name == "time_s" else factor * column for name, column in run.history.items()} | ramp
+    run = Result(run.summary, history)
+    paths = [pulse(5092.0, f"Path {k}") for k in (1, 2, 3)]
+    waves = plot_waves(TIME, paths, {r"$\sqrt{E/\rho}$": 5092.0, "$c_d$": 5692.0, "$c_s$": 3195.0})
+    for figure in (plot_forces(run), plot_energies(run), plot_paths(TIME, paths), waves):
+        box, size = figure.get_tightbbox(figure.canvas.get_renderer()), figure.get_size_inches()  # type: ignore[union-attr]
+        assert (box.min >= 0.0).all() and (box.max <= size).all()
 
 
 def test_a_snapshot_shows_the_faces_towards_the_eye_in_their_colours():

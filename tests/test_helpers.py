@@ -5,6 +5,7 @@ import pickle
 import time
 from dataclasses import dataclass, replace
 
+import numpy as np
 import pytest
 from helper_jobs import place_of
 
@@ -14,6 +15,7 @@ from warp_mca.base.helpers import Helpers, travel
 from warp_mca.phases import by_helpers, prepare
 from warp_mca.phases.settings import Settings
 from warp_mca.system.state import digest
+from warp_mca.watch.passing import DEPTH, Watch, skins_of
 
 THREADS = 3  # the least that have helpers
 
@@ -89,6 +91,13 @@ def test_helpers_begin_anew_where_the_environment_changed(helpers, monkeypatch):
     assert not before & {process for _, process in carry_out(helpers, 2, place_of)}
 
 
+def test_helpers_see_no_gpu(helpers, monkeypatch):
+    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "0")
+    wait_for(helpers)
+    data, here = pickle.dumps(("CUDA_VISIBLE_DEVICES",)), lambda k: "0"
+    assert "" in helpers.carry_out(os.getenv, 4, lambda k: data, here, 2)
+
+
 def test_helpers_change_no_bit_of_a_scene(at_once):
     """While they begin, and when they are there; what is told of stages and of models is told of theirs, too."""
     scenes = [
@@ -111,6 +120,23 @@ def test_helpers_change_no_bit_of_a_scene(at_once):
         found, clock = prepared(THREADS)
         assert found == alone
     assert clock.wall["rigid"] > 0.0 and clock.wall["mesh"] > 0.0 and time.perf_counter() - clock.last < 1.0
+
+
+def test_skins_that_a_helper_makes_see_what_others_see():
+    scene = mca.make_scene("single_link", axial=6, plate_core=2)
+    found, _ = by_helpers.prepare_one(pickle.dumps(scene), {}, 1e-5, Settings("cpu", "mixed", 1))
+    ready = pickle.loads(pickle.dumps(found))
+    looks = []
+    for skins in (ready.skins, ()):
+        watch = Watch(ready.scene, ready.meshes, ready.model, 1e-8, 1e-5, skins)
+        x, pressed, passed = ready.model.X[watch.nodes], np.zeros(len(ready.model.passes)), np.zeros((0, 6))
+        for down in (0.0, 2e-3, 4e-3):
+            link = np.arange(len(x)) < len(skins_of(ready.scene, ready.meshes, ready.model)[0].nodes)
+            moved = x - down * link[:, None] * [0.0, 1.0, 0.0]
+            passed, steps = watch.look(moved, 1.0, pressed, down, passed)
+            looks.append((passed.tobytes(), steps))
+        assert passed[:, DEPTH].max() > 1e-3
+    assert len(ready.skins) == 2 and looks[:3] == looks[3:]
 
 
 def no_one(number: int) -> None:

@@ -1,5 +1,7 @@
 """What a record sums: against NumPy's sums of the arrays that it is of, by scene and whatever the number of entries."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import warp as wp
@@ -16,6 +18,8 @@ from warp_mca.kernels.records.columns import (
     STRAIN,
 )
 from warp_mca.kernels.records.ledger import RUN, SUM_WIDTH
+from warp_mca.system.layout import Layout
+from warp_mca.system.workspace import run_count
 
 COLUMNS = 8
 
@@ -83,3 +87,17 @@ def test_elements_of_several_blocks_and_scenes(precision: str):
     second = slice(*ranges[1, 1])
     alone = sums(np.ascontiguousarray(energy[:, second]), np.array([[[0, 1000]]], dtype=np.int32))
     assert np.array_equal(alone[0], partial[1], equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    ("entries", "expected"), [(5, 8), (8 * RUN, 8), (8 * RUN + 1, 16), (60 * RUN, 64), (10**6, 256)]
+)
+def test_a_batch_keeps_as_many_runs_as_its_scenes_have_and_sums_stay(entries: int, expected: int):
+    layout = Layout(nodes=offsets(3, entries), joints=offsets(0, 0), elements=np.zeros((2, 1, 2), dtype=np.int32))
+    none = SimpleNamespace(passes=(), loads={}, absorbing=SimpleNamespace(node=np.zeros(0)))
+    assert run_count(none, layout) == expected  # type: ignore[arg-type]
+    partial = np.zeros((5, 2, 7, SUM_WIDTH))
+    filled = min(expected, -(-entries // RUN))
+    partial[..., :filled] = np.random.default_rng(entries).normal(size=(5, 2, 7, filled))
+    few = np.ascontiguousarray(partial[..., :expected])
+    assert np.array_equal(few[:, 1][:4, :6].sum(axis=2), partial[:, 1][:4, :6].sum(axis=2))

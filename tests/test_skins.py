@@ -81,3 +81,20 @@ def test_a_body_that_turns_as_a_whole_is_not_bent():
     assert turned.bent() < 1e-12
     turned.move(turned.x + np.array([0.0, 0.002, 0.0]) * (turned.x[:, :1] > turned.x[:, 0].mean()))
     assert turned.bent() == pytest.approx(0.001, rel=0.5)
+
+
+def test_a_skin_that_is_looked_at_again_finds_what_a_new_one_finds():
+    """With fewer edges, more of them than ever before, and other places."""
+    one, other = box((0.02,) * 3, (4, 4, 4)), box((0.01,) * 3, (2, 2, 2))
+    crossing = 0
+    for shift, count in ((0.008, 5), (0.009, 3), (0.007, None), (0.0115, 40)):
+        found = []
+        for pair in ((one, other), (box((0.02,) * 3, (4, 4, 4)), box((0.01,) * 3, (2, 2, 2)))):
+            pair[1].move(pair[1].X + np.array([shift, 0.001, 0.0]))
+            for skin in pair:
+                skin.settle(np.array([0.01, 0.0, 0.0]))
+            edges = np.arange(len(pair[0].edge), dtype=np.int32)[:count]
+            found.append([*pair[0].edges_in(pair[1], edges), *pair[1].edges_in(pair[0], edges[: len(pair[1].edge)])])
+        assert all(np.array_equal(a, b) for a, b in zip(*found, strict=True))
+        crossing += found[0][0].any() or found[0][2].any()
+    assert crossing > 1

@@ -208,6 +208,34 @@ def test_small_scenes_share_a_model_on_a_gpu_as_far_as_they_fill_it():
     assert planned(fine, device="cuda:0") == [[0], [1, 2]]
 
 
+def test_scenes_of_nearly_equal_meshes_share_a_model():
+    """Not those with other cells, other corners of a finished mesh, or lengths that differ by more than a tenth."""
+    scene = blocks(1.0)[0]
+    body = scene.bodies[0]
+
+    def of(size: tuple[float, float, float], *divisions: int) -> mca.Scene:
+        geometry = mca.Box(size=size, divisions=divisions or (2, 1, 1))  # type: ignore[arg-type]
+        return replace(scene, bodies=(replace(body, geometry=geometry),))
+
+    sizes = [
+        (0.02, 0.01, 0.01),
+        (0.0205, 0.01, 0.0095),
+        (0.025, 0.01, 0.01),
+        (0.0215, 0.0105, 0.01),
+        (0.0265, 0.01, 0.01),
+    ]
+    scenes = [*map(of, sizes), of(sizes[0], 3, 1, 1)]
+    meshes = [mca.Box(size=size, divisions=(2, 1, 1)).build() for size in sizes[:2]]
+    scenes += [replace(scene, bodies=(replace(body, geometry=mesh),)) for mesh in meshes]
+    groups = planned(scenes, device="cuda:0")
+    assert groups == [[0, 1, 3], [2, 4], [5], [6], [7]]
+    rows = mca.sweep(scenes[:4], batch=3)
+    alone = [mca.run(item).summary for item in scenes[:4]]
+    assert rows[0]["dt"] == rows[1]["dt"] == rows[3]["dt"] == min(alone[k]["dt"] for k in (0, 1, 3))
+    assert rows[2]["dt"] == alone[2]["dt"] and all(row["status"] == "done" for row in rows)
+    assert [row["F_n_max"] for row in rows] == pytest.approx([one["F_n_max"] for one in alone], rel=0.02)
+
+
 @pytest.mark.gpu
 def test_rows_from_a_gpu_are_those_of_a_batch():
     rows = mca.sweep(blocks(*SPEEDS), device="cuda", out="all", folders=True)

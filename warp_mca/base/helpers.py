@@ -29,8 +29,11 @@ class _Helper:
 
     def __init__(self, modules: Sequence[str]) -> None:
         command = [sys.executable, "-P", str(_PROGRAM)]
+        env = {**os.environ, "CUDA_VISIBLE_DEVICES": ""}  # no context of its own on a GPU, which takes memory and time
         # a session of its own: an interrupt from the keyboard is for this process alone
-        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True)
+        self.process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True, env=env
+        )
         assert self.process.stdin is not None and self.process.stdout is not None
         self._to, self._from = self.process.stdin, self.process.stdout
         self.begun = False

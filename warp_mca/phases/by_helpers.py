@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 import time
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 
 from warp_mca.base.errors import RequestError
@@ -16,6 +17,7 @@ from warp_mca.phases.meshing import made_of
 from warp_mca.phases.prepare import Prepared, Request, prepare
 from warp_mca.phases.settings import Settings
 from warp_mca.scene import Scene
+from warp_mca.watch.passing import skins_of
 from warp_mca.watch.row import Finished
 from warp_mca.watch.table import told_at_the_end
 
@@ -105,7 +107,8 @@ def prepare_one(scene: bytes, made: dict[object, Mesh], span: float, settings: S
     """What a helper does: a pickled scene at the start of its impact phase, and wall time by stage [s]."""
     request = Request(span=span, settings=settings)
     with unchanged():
-        return prepare(pickle.loads(scene), None, request, made), request.clock.wall
+        ready = prepare(pickle.loads(scene), None, request, made)
+        return replace(ready, skins=skins_of(ready.scene, ready.meshes, ready.model)), request.clock.wall
 
 
 def told(finished: Sequence[Finished], before: Sequence[Sequence[str]], threads: int) -> list[tuple[str, ...]]:
@@ -123,9 +126,18 @@ def told(finished: Sequence[Finished], before: Sequence[Sequence[str]], threads:
     wanted = len(finished) > threads > 2 and HELPERS.count >= threads and not registered()
     if not wanted or not _pickled([item.scene for item in finished]):
         return [here(k) for k in range(len(finished))]
-    return HELPERS.carry_out(
-        tell_one, len(finished), lambda k: pickle.dumps((finished[k], before[k]), protocol=5), here, threads
-    )
+
+    def data(k: int) -> bytes:
+        return pickle.dumps((_to_tell(finished[k]), before[k]), protocol=5)
+
+    return HELPERS.carry_out(tell_one, len(finished), data, here, threads)
+
+
+def _to_tell(finished: Finished) -> Finished:
+    """A scene without the rows of which nothing is told: they are most of its bytes."""
+    ledger = copy(finished.ledger)
+    ledger.kept = replace(ledger.kept, path_stress=[], sensors=[])
+    return replace(finished, ledger=ledger)
 
 
 def tell_one(finished: Finished, before: Sequence[str]) -> tuple[str, ...]:

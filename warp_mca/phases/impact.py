@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,8 +29,10 @@ from warp_mca.step.sensor_stage import SensorStage
 from warp_mca.step.solver import Solver
 from warp_mca.step.state_figures import at_last_record
 from warp_mca.step.steps import Steps
+from warp_mca.system.reading import on_host
 from warp_mca.system.records import SceneRecords
 from warp_mca.system.state import State
+from warp_mca.watch.bent_scenes import Together
 from warp_mca.watch.passing import Watch
 
 if TYPE_CHECKING:
@@ -41,6 +44,7 @@ if TYPE_CHECKING:
 
 
 Array = NDArray[np.float64]
+SETS = 5  # of records that the scenes of a batch take in at once, at most
 
 
 class Impact:
@@ -85,7 +89,7 @@ class Impact:
         """
         alike = with_alike_passes([item.model for item in ready])
         ready = [replace(item, model=model) for item, model in zip(ready, alike, strict=True)]
-        self.ready = tuple(ready)
+        self.ready, self._threads = tuple(ready), threads
         self.steps = divide_alike([(item.scene, item.model) for item in ready], span)
         model = join_models([item.model for item in ready])
         model = with_floating_frames(model, [item.scene for item in ready], span, precision)
@@ -107,8 +111,24 @@ class Impact:
         self.exposed = Exposed(self.ready[0], self.solver, self.state) if model.fails and len(ready) == 1 else None
         self.stopped: list[str | None] = [None] * len(self.ready)
         self.recording: Recording | None = None
-        self._watches = [Watch(item.scene, item.meshes, item.model, self.solver.dt, span) for item in ready]
+        self._held: list[dict[str, NDArray]] = []
+        self._sets = 1  # so that scenes that break at once end the run at once
+        self._watches = [Watch(item.scene, item.meshes, item.model, self.solver.dt, span, item.skins) for item in ready]
         self._begin_scenes()
+
+    @cached_property
+    def together(self) -> Together:
+        """Cells of several scenes whose bending is looked at."""
+        return Together([(item.ledger.model, item.looks.samples) for item in self.scene_runs], self._threads)
+
+    def look_at_the_end(self) -> None:
+        """Look at the bending of all scenes of a batch, for their results; a lone one looks itself."""
+        looks = [item.looks for item in self.scene_runs]
+        if len(looks) > 1 and any(item.samples for item in looks):
+            before = [item.ledger.kept.stiffened for item in looks]
+            u = np.asarray(on_host(self.state.u), dtype=np.float64)
+            for item, found in zip(looks, self.together.seen(u, before), strict=True):
+                item.last = found
 
     def _begin_scenes(self) -> None:
         first = offsets([len(item.probes.corner) for item in self.ready])
@@ -189,11 +209,32 @@ class Impact:
         return at_last_record(self.solver, self.state)
 
     def read(self, written: int, records: Mapping[str, NDArray]) -> None:
-        """Hand records to each scene that no guard has stopped.
+        """Hand records to each scene that no guard has stopped; of a batch, those of several sets at once.
+
+        What a record of a small scene costs is calls of numpy. Flags are told as soon as they are raised.
 
         Raises:
             GuardError: a guard stops the last one.
         """
+        if len(self.scene_runs) == 1:
+            return self._hand_over(written, records)
+        raised = bool(records["flag"][:, :-1].any())
+        if raised:
+            self.read_rest()
+        kept = {name: array.copy() if name == "flag" else array[:written].copy() for name, array in records.items()}
+        self._held.append(kept)
+        if raised or len(self._held) >= self._sets:
+            self._sets = min(self._sets + 1, SETS)
+            self.read_rest()
+
+    def read_rest(self) -> None:
+        """Hand over what is held of a batch; raises as `read`."""
+        held, self._held = self._held, []
+        if held:
+            joined = {name: np.concatenate([item[name] for item in held]) for name in held[0] if name != "flag"}
+            self._hand_over(len(joined["partial"]), joined | {"flag": held[-1]["flag"]})
+
+    def _hand_over(self, written: int, records: Mapping[str, NDArray]) -> None:
         for k, scene_run in enumerate(self.scene_runs):
             if self.stopped[k] is None:
                 try:

@@ -53,6 +53,8 @@ class Loop:
             self.impact.recording.catch_up(self._receive_arrived)
         while self.transfer.pending:
             self._receive()
+        self.impact.read_rest()
+        self.told()
 
     def _ends(self, interval: int) -> bool:
         """Whether the phase ends with this row, by what the rows before it say."""
@@ -105,7 +107,8 @@ class Loop:
             self.looks = self._looks()
 
     def _looks(self) -> Looks:
-        return Looks(self.solver, self.state, [item.looks for item in self.impact.scene_runs])
+        looks = [item.looks for item in self.impact.scene_runs]
+        return Looks(self.solver, self.state, looks, lambda: self.impact.together)
 
     def _record(self, count: int, row: int | None, searches: bool = False) -> None:
         """Record and step; `row` is the number of the row of the history that the record gives, if it gives one."""

@@ -112,7 +112,8 @@ def _edge(stage: ContactStage, scene: int) -> float:
 
 def _rounding(stage: ContactStage, scene: int, solver: Solver) -> float:
     """Depth that rounding explains [m]."""
-    return max(ROUNDING * _edge(stage, scene), 8.0 * float(np.spacing(np.abs(solver.model.X).max())))
+    own = solver.model.X[slice(*solver.layout.nodes[scene : scene + 2])]
+    return max(ROUNDING * _edge(stage, scene), 8.0 * float(np.spacing(np.abs(own).max())))
 
 
 def _found(slaves: NDArray[np.int32], depth: Array, energy: Array, least: float) -> Overlap | None:

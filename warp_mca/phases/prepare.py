@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from warp_mca.phases.checkpoint import Checkpoint
     from warp_mca.phases.motion import Motion
     from warp_mca.recorders.recorder import Recorder
+    from warp_mca.watch.skins import Skin
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,7 @@ class Prepared:
         probes: of its paths.
         sensors: its probes and sections.
         warnings: what is told before the run.
+        skins: of its bodies, as `skins_of`; empty where the impact makes them.
     """
 
     scene: Scene
@@ -56,6 +58,7 @@ class Prepared:
     probes: Probes
     sensors: Sensors = NO_SENSORS
     warnings: tuple[str, ...] = ()
+    skins: Sequence[Skin] = ()
 
 
 @dataclass

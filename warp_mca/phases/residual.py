@@ -8,7 +8,9 @@ the run.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -65,6 +67,7 @@ class Relaxation:
         self.solver = Solver(model, device=settings.device, precision="float64", dt=dt, threads=settings.threads)
         self.solver.compile()
         self.base, self.trial = self.solver.new_state(), self.solver.new_state()
+        self._graphs: dict[str, Any] = {}
         second, tied = model.joint_second, np.ones(len(model.joint_first), dtype=bool)
         for item in model.couplings:
             tied[item.start : item.end] = False
@@ -142,20 +145,35 @@ class Relaxation:
     def _evaluate(self, u: Array) -> None:
         """Let the trial state have displacements and what its elements make of them, from the history at the start."""
         self.trial.u.assign(u)
+        self._replay(self._strain)
+
+    def _strain(self) -> None:
         for own, kept in zip(self.trial.elements, self.base.elements, strict=True):
             wp.copy(own.yielded, kept.yielded)
             wp.copy(own.history, kept.history)
+        for stage in self.solver.elements:
+            stage.launch(self.solver.work, self.trial)
+
+    def _push(self) -> None:
+        self.trial.v.zero_()
+        self.solver.nodes.integrate(self.trial, 1.0, 0.0, self.solver.constraints.at_rest)
+
+    def _replay(self, body: Callable[[], None]) -> None:
+        """Launch what `body` does: from the second time on as a graph, because a search asks a thousand times."""
         with wp.ScopedDevice(self.solver.device):
-            for stage in self.solver.elements:
-                stage.launch(self.solver.work, self.trial)
+            if body.__name__ in self._graphs:
+                wp.capture_launch(self._graphs[body.__name__])
+                return
+            body()
+            with wp.ScopedCapture() as capture:
+                body()
+            self._graphs[body.__name__] = capture.graph
 
     def _forces(self, u: Array) -> Array:
         """Forces of the elements on the nodes [N]; nodes that follow others give these their forces."""
         first, second = self.model.joint_first[self.tied], self.model.joint_second[self.tied]
         self._evaluate(self._followed(u))
-        with wp.ScopedDevice(self.solver.device):
-            self.trial.v.zero_()
-            self.solver.nodes.integrate(self.trial, 1.0, 0.0, self.solver.constraints.at_rest)
+        self._replay(self._push)
         inertia = np.where(self.model.mass > 0.0, self.model.mass, 1.0)  # as `Workspace.inverse_mass` divides
         force = self.model.ties.carried(inertia[:, None] * (self.trial.v.numpy() - self.model.gravity[0]))
         force[first] += force[second]

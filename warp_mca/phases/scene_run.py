@@ -207,9 +207,9 @@ class SceneRun:
             more["bonds"] = {names[contact]: report for contact, report in found.items()}
         if scene.ties:
             more["ties"] = [dict(fact) for fact in self.ready.model.ties.facts]
-        if scene.stress_paths:
-            body = scene.body(scene.stress_paths[0].lines[0].body)
-            more["path_headings"] = {path.name: path.heading for path in scene.stress_paths}
+        if paths := scene.stress_paths:
+            body = scene.body(paths[0].lines[0].body)
+            more["path_headings"] = {path.name: path.heading for path in paths}
             more["wave_speeds"] = body_materials(body, self.ready.meshes[body.name])[0][0].wave_speeds
         return dict(
             scene=scene.name,

@@ -69,6 +69,7 @@ def simulate(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | Non
     failed = tuple(recording.failed) if recording else ()
     tell("impact", 1.0)
     with read_once():
+        impact.look_at_the_end()
         ended = [
             item.outcome(clock.wall, stopped, before=rows_before(item, course.stretches))
             for item, stopped in zip(impact.scene_runs, impact.stopped, strict=True)

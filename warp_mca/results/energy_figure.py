@@ -18,6 +18,7 @@ from warp_mca.results.figure_style import (
     engineering,
     legend_beside,
     new_figure,
+    place,
     save_png,
     tidy,
 )
@@ -40,7 +41,7 @@ CURVES = (
 
 def plot_energies(result: Result) -> Figure:
     """The figure: energies [J] above, error of their balance [J] below, over time [ms]."""
-    figure = new_figure(7.0, 5.0)
+    figure = new_figure(7.0, 5.0, "none")
     energies, balance = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
     names = ("E_kinetic", "E_plastic", "E_friction", "E_contact", "E_absorbed")
     values = {name: result[name] for name in names if name in result.history}
@@ -59,7 +60,7 @@ def plot_energies(result: Result) -> Figure:
     balance.set_ylabel(f"error [{unit}]")
     balance.set_xlabel("time after first contact [ms]")
     balance.set_xlim(*(1e3 * result.time[[0, -1]] if len(result.time) else (0.0, 1.0)))
-    figure.align_ylabels()
+    place(figure, (energies, balance), right=1.9)
     for axes in (energies, balance):
         tidy(axes)
         legend_beside(axes)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,7 @@ BLUE, VERMILION, BLACK = "#0072B2", "#D55E00", "#222222"
 GREEN, SKY, ORANGE, PURPLE = "#009E73", "#56B4E9", "#E69F00", "#CC79A7"
 STICK = "#F0E442"
 DOTS_PER_INCH = 200
+LABEL = 0.18  # from the left edge of a figure to the labels of y axes [inch]
 FIGURES = ("png", "none")  # what a run draws
 
 
@@ -31,14 +33,41 @@ def check_figures(value: object) -> bool:
     return value != "none"
 
 
-def new_figure(width: float, height: float) -> Figure:
-    """An empty figure of `width` by `height` [inch] that draws without a display."""
+def new_figure(width: float, height: float, layout: str = "constrained") -> Figure:
+    """An empty figure of `width` by `height` [inch] that draws without a display; layout "none" for `place`."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), layout="constrained")
+    figure = Figure(figsize=(width, height), layout=layout)  # pyright: ignore[reportArgumentType]
     FigureCanvasAgg(figure)
     return figure
+
+
+def place(
+    figure: Figure,
+    panels: Sequence[Axes],
+    *,
+    left: float = 0.9,
+    right: float = 0.2,
+    top: float = 0.3,
+    bottom: float = 0.55,
+    gap: float = 0.18,
+) -> None:
+    """Give panels above each other fixed places, and line up the labels of their y axes.
+
+    That takes half the time of a constrained layout, which draws all to know how large it is.
+
+    Args:
+        figure: that has them.
+        panels: in one column, from the top.
+        left, right, top, bottom: room around them [inch].
+        gap: between two [inch].
+    """
+    width, height = figure.get_size_inches()
+    each = (height - top - bottom - gap * (len(panels) - 1)) / len(panels)
+    figure.subplots_adjust(left / width, bottom / height, 1.0 - right / width, 1.0 - top / height, hspace=gap / each)
+    for axes in panels:
+        axes.yaxis.set_label_coords(-(left - LABEL) / (width - left - right), 0.5)
 
 
 def tidy(axes: Axes) -> None:

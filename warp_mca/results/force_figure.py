@@ -24,6 +24,7 @@ from warp_mca.results.figure_style import (
     VERMILION,
     legend_beside,
     new_figure,
+    place,
     save_png,
     tidy,
 )
@@ -70,7 +71,7 @@ def compression_phases(result: Result) -> tuple[list[Interval], list[Interval]]:
 def plot_forces(result: Result) -> Figure:
     """The figure: F_n and F_t [N or kN], below them velocities of tip and plate [m/s] if any, over time [ms]."""
     moving = _shown_velocities(result)
-    figure = new_figure(7.0, 5.6 if moving else 3.6)
+    figure = new_figure(7.0, 5.6 if moving else 3.6, "none")
     heights = (3, 2) if moving else (1,)
     panels = list(figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0])
     forces = panels[0]
@@ -79,7 +80,7 @@ def plot_forces(result: Result) -> Figure:
     _draw_forces(forces, result)
     if moving:
         _draw_velocities(panels[1], result, moving)
-    figure.align_ylabels()
+    place(figure, panels, right=1.65)
     for axes in panels:
         tidy(axes)
         legend_beside(axes)

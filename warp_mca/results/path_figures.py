@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.results.figure_style import engineering, new_figure, save_png, tidy
+from warp_mca.results.figure_style import engineering, new_figure, place, save_png, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,7 +51,7 @@ def plot_paths(
         instants = tuple(np.linspace(0.0, FIRST * time[-1], INSTANTS + 1)[1:])
     rows = np.array([np.argmin(np.abs(time - instant)) for instant in instants])
     paths = [path.at(rows) for path in paths]
-    figure = new_figure(7.0, 1.0 + 1.9 * len(paths))
+    figure = new_figure(7.0, 1.0 + 1.9 * len(paths), "none")
     panels = np.atleast_1d(figure.subplots(len(paths), 1, sharex=True))
     for axes, path in zip(panels, paths, strict=True):
         # Right at the contact stress is many times that of the waves; curves may leave the panel there.
@@ -69,6 +69,7 @@ def plot_paths(
         axes.set_xlim(1e3 * path.position[0], 1e3 * path.position[-1])
         axes.set_ylim(0.0, 1.05 * scale * greatest or 1.0)
         tidy(axes)
+    place(figure, panels, right=1.25, gap=0.4)
     panels[-1].set_xlabel("position along the path, from the struck end [mm]")
     panels[0].legend(title="after contact", loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
     return figure
@@ -87,8 +88,9 @@ def plot_waves(
     """
     from matplotlib.colors import LogNorm
 
-    figure = new_figure(7.0, 1.0 + 2.1 * len(paths))
+    figure = new_figure(7.0, 1.0 + 2.1 * len(paths), "none")
     panels = np.atleast_1d(figure.subplots(len(paths), 1, sharex=True, sharey=True))
+    place(figure, panels, top=0.6, gap=0.4)
     far = max(float(path.position[-1]) for path in paths)
     shown = time <= PASSAGES * far / min(speeds.values()) if speeds else np.ones(len(time), dtype=bool)
     time, paths = time[shown], [path.at(shown) for path in paths]
@@ -108,7 +110,7 @@ def plot_waves(
         axes.set_title((headings or {}).get(path.name, path.name), loc="left", fontsize=10)
         axes.set_ylabel("position [mm]")
     panels[-1].set_xlabel("time after first contact [µs]")
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=3, frameon=False)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="upper center", ncols=3, frameon=False)
     return figure
 
 

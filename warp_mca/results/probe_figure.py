@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warp_mca.results.figure_style import BLUE, GREEN, VERMILION, engineering, legend_beside, new_figure, save_png, tidy
+from warp_mca.results.figure_style import (
+    BLUE,
+    GREEN,
+    VERMILION,
+    engineering,
+    legend_beside,
+    new_figure,
+    place,
+    save_png,
+    tidy,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,14 +40,14 @@ def plot_probes(result: Result) -> Figure:
         panels.append((probe.name, "acceleration", "m/s²", probe.acceleration, smooth, label))
     panels += [(section.name, "force", "N", section.force, None, "") for section in result.sections]
     panels = panels[:MOST]
-    figure = new_figure(7.0, 0.6 + 2.0 * len(panels))
+    figure = new_figure(7.0, 0.6 + 2.0 * len(panels), "none")
     columns = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     for axes, (name, what, unit, raw, smooth, label) in zip(columns, panels, strict=True):
         _draw(axes, 1e3 * result.time, what, unit, raw, smooth, label)
         axes.set_title(name, loc="left", fontsize=10)
     columns[-1].set_xlabel("time after first contact [ms]")
     columns[-1].set_xlim(*(1e3 * result.time[[0, -1]] if len(result.time) > 1 else (0.0, 1.0)))
-    figure.align_ylabels()
+    place(figure, columns, right=1.5, gap=0.4)
     return figure
 
 

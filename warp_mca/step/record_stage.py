@@ -78,6 +78,7 @@ class RecordStage(Actor):
     def sum_runs(self, kernel: Any, largest: int, inputs: list[Any], *outputs: wp.array) -> None:
         """Sums of each run of entries, by a block of threads each; no scene has more entries than `largest`."""
         runs = min(max(-(-largest // ledger.RUN), 1), ledger.SUM_WIDTH)
+        assert runs <= self.work.partial.shape[3]
         threads = (self.scenes, runs, self.lanes)
         wp.launch(kernel, threads, inputs=[self.work.row, *inputs], outputs=[self.work.partial, *outputs])
 

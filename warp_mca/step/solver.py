@@ -260,7 +260,7 @@ class Solver(Made):
         """Rings of ROWS records, which wrap, and the flags raised so far.
 
         Returns:
-            `partial`: partial sums, shape (ROWS, scene_count, columns, SUM_WIDTH), float64; `point_velocity` [m/s],
+            `partial`: partial sums, shape (ROWS, scene_count, columns, run_count), float64; `point_velocity` [m/s],
             shape (ROWS, point_count), vec3d; `flag`, shape (scene_count, 4), int32; `path_stress` [Pa], where the scene
             has paths, shape (ROWS, probe_count), vec6 of float32; `sensors`, where it has probes or sections.
         """

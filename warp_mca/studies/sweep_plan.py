@@ -14,15 +14,18 @@ import numpy as np
 
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.geometry import Cad, MeshFile
+from warp_mca.geometry.mesh import Mesh
 from warp_mca.scene import Contact, ContactAll, Controller, RigidPlane, Scene
 from warp_mca.scene.materials import Elastic
 
 if TYPE_CHECKING:
-    from warp_mca.geometry.mesh import Mesh
     from warp_mca.phases.rate_groups import MultiRate
     from warp_mca.scene import Body, Contact
 
+ALIKE = 0.1  # by which lengths and angles of meshes in a batch differ: its step is the least that one of them needs
 FULL = 100_000  # elements that fill a GPU: docs/measurements/options.md has the measurement
+
+_Group = tuple[list[float], list[int]]  # sizes of the first scene, numbers of all
 
 
 @dataclass(frozen=True)
@@ -129,17 +132,23 @@ def batches(plan: Plan, meshes: Mapping[str, Mesh] | None = None) -> list[list[i
 
     They depend on the sweep alone, never on what is left of it or on the number of workers: scenes of a batch share
     their time step, and so rows of a sweep that was interrupted equal those of one that was not. Scenes of a batch have
-    the same meshes, stiffness and density, and so nearly the same step by themselves.
+    as many cells, lengths within `ALIKE`, the same stiffness and density, and so nearly the same step by themselves.
 
     Args:
         plan: of the sweep.
         meshes: finished meshes by body, of all its scenes, or None.
     """
-    groups: dict[object, list[int]] = {}
+    kinds: dict[object, list[_Group]] = {}
     for k, scene in enumerate(plan.scenes):
-        groups.setdefault(_step_key(scene, plan.options, k), []).append(k)
+        sizes: list[float] = []
+        groups = kinds.setdefault(_step_key(scene, plan.options, k, sizes), [])
+        near = (numbers for first, numbers in groups if _alike(first, sizes))
+        if (group := next(near, None)) is not None:
+            group.append(k)
+        else:
+            groups.append((sizes, [k]))
     found = []
-    for group in groups.values():
+    for _, group in itertools.chain(*kinds.values()):
         limit = plan.batch or _limit(plan.scenes[group[0]], plan.options.device, meshes)
         count = -(-len(group) // limit)
         ends = [len(group) * k // count for k in range(count + 1)]
@@ -160,8 +169,30 @@ def _limit(scene: Scene, device: str, meshes: Mapping[str, Mesh] | None) -> int:
     return max(1, FULL // sum(item.cell_count for item in meshed.values()))
 
 
-def _step_key(scene: Scene, options: RunOptions, number: int) -> object:
-    """Equal for scenes that may share a batch: those of one duration, step, and kind of contacts."""
+def _alike(one: Sequence[float], other: Sequence[float]) -> bool:
+    """Whether lengths and angles of recipes are, so that their cells are nearly as large."""
+    pairs = zip(one, other, strict=True)
+    return all(a == b or abs(a - b) <= ALIKE * max(abs(a), abs(b)) for a, b in pairs)
+
+
+def _without_sizes(value: object, sizes: list[float]) -> object:
+    """What a recipe has beside its floating-point numbers, which are added to `sizes`."""
+    if isinstance(value, float):
+        sizes.append(value)
+        return float
+    if isinstance(value, tuple | list):
+        return [_without_sizes(part, sizes) for part in value]
+    if dataclasses.is_dataclass(value) and not isinstance(value, type | Cad | MeshFile | Mesh):
+        fields = [(f.name, getattr(value, f.name)) for f in dataclasses.fields(value)]
+        return type(value), [(name, _without_sizes(part, sizes)) for name, part in fields]
+    return value
+
+
+def _step_key(scene: Scene, options: RunOptions, number: int, sizes: list[float]) -> object:
+    """Equal for scenes that may share a batch if the `sizes` of their recipes, which are added, are alike.
+
+    They have one duration, nearly one step, and contacts of one kind.
+    """
     whole = [(joint.name, found) for joint in scene.acting_joints if (found := joint.whole())]
     asked = any(isinstance(freedom.motor, Controller) for _, joint in whole for freedom in joint.freedoms)
     if scene.t_end is not None or options.multi_rate is not None or asked:
@@ -170,7 +201,15 @@ def _step_key(scene: Scene, options: RunOptions, number: int) -> object:
     span = impact.duration if options.duration is None else options.duration
     digest = hashlib.sha256()
     for body in scene.bodies:
-        key = body.name, body.geometry, _elastic(body), body.element, body.kinematics, body.rigid, body.exact_mass
+        key = (
+            body.name,
+            _without_sizes(body.geometry, sizes),
+            _elastic(body),
+            body.element,
+            body.kinematics,
+            body.rigid,
+            body.exact_mass,
+        )
         _feed(digest, (*key, body.across, body.mass, body.centre, body.inertia))
     _feed(digest, whole)
     for contact in scene.contacts:

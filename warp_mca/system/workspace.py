@@ -11,7 +11,7 @@ from warp_mca.kernels.elements.failure import ENERGIES
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.nodes.floating import Frames
 from warp_mca.kernels.records.columns import JACOBIAN
-from warp_mca.kernels.records.ledger import SUM_WIDTH
+from warp_mca.kernels.records.ledger import RUN, SUM_WIDTH
 from warp_mca.system.columns import column_count
 from warp_mca.system.layout import Layout
 from warp_mca.system.model import Model
@@ -23,6 +23,22 @@ if TYPE_CHECKING:
 
 ROWS = 32  # records kept on the device before the host reads them
 ALL = slice(None)
+
+
+def run_count(model: Model, layout: Layout) -> int:
+    """Runs that records keep of each scene: SUM_WIDTH, or fewer where the scenes of a batch are small.
+
+    Any power of two from 8 on gives the same bits, because numpy adds as many numbers side by side.
+    """
+    if layout.count == 1:
+        return SUM_WIDTH
+    springs = max((item.sides for item in model.passes), default=0) * max(
+        (len(item.slave) for item in model.passes), default=0
+    )
+    loaded = sum(len(item.node) for items in model.loads.values() for item in items)
+    own = [np.diff(layout.nodes).max(), np.diff(layout.elements).sum(axis=(1, 2)).max()]
+    most = max(springs, loaded, len(model.absorbing.node), *map(int, own))
+    return min(SUM_WIDTH, max(8, 1 << (-(-most // RUN) - 1).bit_length()))
 
 
 class Workspace:
@@ -45,7 +61,7 @@ class Workspace:
         v_before: velocities at the half step before a record [m/s], shape (node_count,), vec3d.
         energy: of each element at a record, see `ElementStage.energies`, shape (5 to 7, element_count).
         row: of the latest record in the rings, shape (1,), int32.
-        partial: ring of partial sums, shape (ROWS, scene_count, column_count, SUM_WIDTH), float64.
+        partial: ring of partial sums, shape (ROWS, scene_count, column_count, run_count), float64.
         point_node: recorded nodes, 0 where there is none, shape (point_count,), int32.
         point_velocity: ring of their velocities [m/s], shape (ROWS, point_count), vec3d.
         gravity: of each scene [m/s^2], shape (scene_count,), vec3d.
@@ -75,7 +91,7 @@ class Workspace:
             (ENERGIES if model.fails else 6 if model.viscous else 5, model.element_count), dtype=t.real
         )
         self.row = wp.full(1, ROWS - 1, dtype=wp.int32)
-        self.partial = wp.zeros((ROWS, layout.count, column_count(model), SUM_WIDTH), dtype=wp.float64)
+        self.partial = wp.zeros((ROWS, layout.count, column_count(model), run_count(model, layout)), dtype=wp.float64)
         self.partial[:, :, JACOBIAN].fill_(1.0)  # runs beyond the last are never written
         self.point_node = wp.array(np.maximum(model.points, 0), dtype=wp.int32)
         self.point_velocity = wp.zeros((ROWS, len(model.points)), dtype=wp.vec3d)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from warp_mca.step.transfer import Transfer
 from warp_mca.watch.bending import LOOKS, samples_of, seen
 from warp_mca.watch.bent_cells import Array, Cells
-from warp_mca.watch.bent_scenes import Together
 
 if TYPE_CHECKING:
     from warp_mca.step.solver import Solver
     from warp_mca.system.state import State
+    from warp_mca.watch.bent_scenes import Together
     from warp_mca.watch.ledger import Ledger
     from warp_mca.watch.passing import Watch
 
@@ -30,7 +30,10 @@ class SceneLooks:
         ledger: of the scene.
         watch: what may go into each other.
         index: number of the scene in the solver's layout.
+        last: what `bent` returns where the scenes of a batch were looked at together at the end; None before.
     """
+
+    last: Array | None = None
 
     def __init__(self, solver: Solver, ledger: Ledger, watch: Watch, index: int) -> None:
         self.ledger, self.watch, self.index, self._solver = ledger, watch, index, solver
@@ -44,6 +47,8 @@ class SceneLooks:
     def bent(self, u: Array) -> Array:
         """`SceneRecords.stiffened` with these displacements of all scenes [m], too."""
         before = self.ledger.kept.stiffened
+        if self.last is not None:
+            return self.last
         return seen(self.ledger.model, self.samples, u[self.nodes], before) if self.samples else before
 
     def look_for_passing(self, steps: int, u: Array, found: Mapping[str, NDArray]) -> None:
@@ -65,9 +70,11 @@ class SceneLooks:
 class Looks:
     """Looks of one call of `Impact.advance`; the device goes on meanwhile."""
 
-    def __init__(self, solver: Solver, state: State, scenes: Sequence[SceneLooks]) -> None:
-        """Prepare the way of what is looked at."""
-        self.state, self.scenes = state, scenes
+    def __init__(
+        self, solver: Solver, state: State, scenes: Sequence[SceneLooks], together: Callable[[], Together]
+    ) -> None:
+        """Prepare the way of what is looked at; `together`: cells of all scenes, where there are several."""
+        self.state, self.scenes, self._together = state, scenes, together
         looked_at = any(item.samples for item in scenes)
         self._shape = Transfer({"u": state.u}, solver.device) if looked_at else None
         self._watch, self._watched, self._due = None, [], []
@@ -83,10 +90,6 @@ class Looks:
         springs = {str(stage.index): state.contacts[stage.index].spring.depth for stage in solver.contacts}
         sources = {"u": self._skins, "speed_square": state.speed_square} | springs
         self._watch = Transfer(sources, solver.device)
-
-    @cached_property
-    def _together(self) -> Together:
-        return Together([(item.ledger.model, item.samples) for item in self.scenes])
 
     def row(self, interval: int, intervals: int) -> None:
         """Look at the bending of bodies, once in a while, where this output interval begins."""
@@ -135,7 +138,7 @@ class Looks:
                 self.scenes[0].ledger.kept.stiffened = self.scenes[0].bent(shape["u"])
                 continue
             before = [item.ledger.kept.stiffened for item in self.scenes]
-            for item, found in zip(self.scenes, self._together.seen(shape["u"], before), strict=True):
+            for item, found in zip(self.scenes, self._together().seen(shape["u"], before), strict=True):
                 item.ledger.kept.stiffened = found
 
     def _see_skins(self) -> None:

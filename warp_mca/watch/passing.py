@@ -8,9 +8,10 @@ look decides when the next one is due, so that nothing passes the thinnest part 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from types import MappingProxyType
 
 import numpy as np
 
@@ -39,13 +40,21 @@ class Watch:
         nodes: of the skins, those of each in turn, in the model's numbering, int32; empty where there is no case.
     """
 
-    def __init__(self, scene: Scene, meshes: Mapping[str, Mesh], model: Model, dt: float, span: float) -> None:
-        """Choose what to look at in an impact phase of `span` [s] with steps of `dt` [s]."""
+    def __init__(
+        self,
+        scene: Scene,
+        meshes: Mapping[str, Mesh],
+        model: Model,
+        dt: float,
+        span: float,
+        skins: Sequence[Skin] = (),
+    ) -> None:
+        """Choose what to look at in an impact phase of `span` [s] with steps of `dt` [s]; `skins` as `skins_of`."""
         self._dt, self._most = dt, max(1, int(span / FEWEST / dt))
         self._driven = float(np.abs(model.table_value).max(initial=0.0))
         self._gravity = float(np.linalg.norm(scene.gravity))
         self._of = scene, meshes, model
-        self._take({}, model.passes)
+        self._take(skins or skins_of(scene, meshes, model), model.passes)
 
     def renew(self, faces: Mapping[str, Index], passes: tuple[ContactPass, ...], passed: Array) -> Array:
         """Look at other surfaces from now on.
@@ -59,7 +68,7 @@ class Watch:
             The same of the cases that there are now.
         """
         before = [case.key for case in self.cases]
-        self._take(faces, passes)
+        self._take(skins_of(*self._of, faces), passes)
         if not len(passed):
             return passed
         found = np.zeros((len(self.cases), passed.shape[1]))
@@ -68,14 +77,9 @@ class Watch:
                 kept[:] = passed[before.index(case.key)]
         return found
 
-    def _take(self, faces: Mapping[str, Index], passes: tuple[ContactPass, ...]) -> None:
+    def _take(self, skins: Sequence[Skin], passes: tuple[ContactPass, ...]) -> None:
         scene, meshes, model = self._of
-        model = replace(model, passes=passes)
-        self._skins = [
-            Skin(b.name, faces.get(b.name, meshes[b.name].boundary[0]), model.X, model.node_start[b.name])
-            for b in scene.bodies
-            if not b.is_inertia
-        ]
+        model, self._skins = replace(model, passes=passes), skins
         self.cases = list(cases_of(scene, meshes, model, self._skins))
         nodes = np.concatenate([np.zeros(0, np.int32), *(skin.nodes for skin in self._skins)])
         self.nodes = nodes[: None if self.cases else 0]
@@ -121,6 +125,17 @@ class Watch:
         fastest = v + math.sqrt(v * v + g * room)
         steps = room / fastest / self._dt if 0.0 < fastest < math.inf else math.inf
         return int(max(CLOSEST, min(self._most, steps)))
+
+
+def skins_of(
+    scene: Scene, meshes: Mapping[str, Mesh], model: Model, faces: Mapping[str, Index] = MappingProxyType({})
+) -> list[Skin]:
+    """The skins of a scene's bodies, in their order; `faces` by body where they are not whole, as in `Watch.renew`."""
+    return [
+        Skin(b.name, faces.get(b.name, meshes[b.name].boundary[0]), model.X, model.node_start[b.name])
+        for b in scene.bodies
+        if not b.is_inertia
+    ]
 
 
 looked = partial(

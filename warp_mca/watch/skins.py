@@ -26,6 +26,52 @@ SHAPE_NODES = 1024  # of a body that tell how far it is out of shape, evenly spr
 NOWHERE: Found = (0.0, np.full(3, np.nan))
 
 
+class _Settling:
+    """How a mesh follows its body: launches that are recorded once, because a look at a small body is all launches."""
+
+    def __init__(self, mesh: wp.Mesh, triangle: wp.array, inward: wp.array) -> None:
+        self._of = mesh, triangle, inward  # which a recorded launch does not keep
+        normal, self.inner = (wp.zeros(len(inward), dtype=wp.vec3f, device="cpu") for _ in range(2))
+        self._points, self._normal = mesh.points.numpy(), normal.numpy()  # they keep their arrays
+        stages = (
+            (crossing.add_normals, len(triangle), [mesh.points, triangle], normal),
+            (crossing.move_inside, len(inward), [mesh.points, normal, inward], self.inner),
+        )
+        self._launches: list[Any] = [
+            wp.launch(kernel, count, inputs=inputs, outputs=[output], device="cpu", record_cmd=True)
+            for kernel, count, inputs, output in stages
+        ]
+
+    def settle(self, x: Array) -> None:
+        """Take the places of the nodes [m], shape (node_count, 3), and move them into the body, as `inner`."""
+        self._points[:] = x
+        self._of[0].refit()
+        self._normal[:] = 0.0
+        for launch in self._launches:
+            launch.launch()
+
+
+class _EdgeSearch:
+    """Edges of one skin in the faces of another, up to `room` of them, recorded likewise."""
+
+    def __init__(self, mesh: wp.Mesh, inner: wp.array, own: wp.array, room: int) -> None:
+        edge = wp.zeros((room, 2), dtype=wp.int32, device="cpu")
+        depth, at = (wp.zeros(room, dtype=kind, device="cpu") for kind in (wp.float32, wp.vec3f))
+        self.room, self._of = room, (mesh, inner, own)  # as above
+        self._edge, self._depth, self._at = edge.numpy(), depth.numpy(), at.numpy()
+        inputs = [mesh.id, inner, edge, own]
+        self._launch: Any = wp.launch(
+            crossing.edges_inside, room, inputs=inputs, outputs=[depth, at], device="cpu", record_cmd=True
+        )
+
+    def found(self, edge: Index) -> tuple[NDArray, NDArray]:
+        """Depth and place of each edge [m], as `Skin.edges_in`, from the origin of the mesh; valid until the next."""
+        self._edge[: len(edge)] = edge
+        self._launch.set_dim(len(edge))
+        self._launch.launch()
+        return self._depth[: len(edge)], self._at[: len(edge)]
+
+
 class Skin:
     """The closed surface of a body, which moves; computed on the host's CPU.
 
@@ -62,13 +108,16 @@ class Skin:
         self.extents = np.sort(np.ptp(centred @ np.linalg.eigh(centred.T @ centred)[1], axis=0))
         self._origin = self.X.mean(axis=0)
         self.x, self._stale = self.X, False
+        self._searches: dict[Skin, _EdgeSearch] = {}
         some = slice(None, None, -(-len(normal) // RAYS))
         self.thickness, self.gap = self._distances(((a + b + c) / 3.0)[some], normal[some])
 
     def __getstate__(self) -> dict[str, Any]:
         """For another process, without what Warp has of it, which is made anew where it is looked at."""
-        own = {name: value for name, value in vars(self).items() if not isinstance(value, wp.Mesh | wp.array)}
-        return own | {"_stale": True}
+        own = {
+            name: value for name, value in vars(self).items() if not isinstance(value, wp.Mesh | wp.array | _Settling)
+        }
+        return own | {"_stale": True, "_searches": {}}
 
     @cached_property
     def _mesh(self) -> wp.Mesh:
@@ -81,18 +130,10 @@ class Skin:
         return wp.array(self.triangle, dtype=wp.int32, ndim=2, device="cpu")
 
     @cached_property
-    def _inward(self) -> wp.array:
-        """How far each node is moved into the body [m], shape (node_count,), float32."""
-        distance = np.minimum(INWARD * self._shortest, FLAT * self.thickness)
-        return wp.array(distance.astype(np.float32), dtype=wp.float32, device="cpu")
-
-    @cached_property
-    def _inner(self) -> wp.array:
-        return wp.zeros(len(self.nodes), dtype=wp.vec3f, device="cpu")
-
-    @cached_property
-    def _normal(self) -> wp.array:
-        return wp.zeros(len(self.nodes), dtype=wp.vec3f, device="cpu")
+    def _settling(self) -> _Settling:
+        # how far each node is moved into the body [m], shape (node_count,), float32
+        inward = np.minimum(INWARD * self._shortest, FLAT * self.thickness).astype(np.float32)
+        return _Settling(self._mesh, self._triangle, wp.array(inward, dtype=wp.float32, device="cpu"))
 
     def _distances(self, middle: Array, normal: Array) -> tuple[float, float]:
         """Thickness and gap, by rays from the middles of triangles along their normals, inwards and outwards."""
@@ -133,14 +174,7 @@ class Skin:
         """Make the mesh ready for `edges_in`, with coordinates from an origin near the body [m], shape (3,)."""
         if not self._stale:
             return
-        self._mesh.points.numpy()[:] = self.x - origin
-        self._mesh.refit()
-        self._normal.zero_()
-        points = self._mesh.points
-        inputs = [points, self._triangle]
-        wp.launch(crossing.add_normals, len(self.triangle), inputs=inputs, outputs=[self._normal], device="cpu")
-        inputs = [points, self._normal, self._inward]
-        wp.launch(crossing.move_inside, len(self.nodes), inputs=inputs, outputs=[self._inner], device="cpu")
+        self._settling.settle(self.x - origin)
         self._origin, self._stale = origin, False
 
     def edges_in(self, other: Skin, chosen: Index) -> tuple[Array, Array]:
@@ -151,13 +185,13 @@ class Skin:
         Returns:
             Depths below planes of crossed faces [m], shape (chosen_count,), and places [m], shape (chosen_count, 3).
         """
-        edge = wp.array(self.edge[chosen], dtype=wp.int32, ndim=2, device="cpu")
-        own = self._triangle if other is self else wp.zeros((0, 3), dtype=wp.int32, device="cpu")
-        depth = wp.zeros(len(chosen), dtype=wp.float32, device="cpu")
-        at = wp.zeros(len(chosen), dtype=wp.vec3f, device="cpu")
-        inputs = [other._mesh.id, self._inner, edge, own]
-        wp.launch(crossing.edges_inside, len(chosen), inputs=inputs, outputs=[depth, at], device="cpu")
-        return depth.numpy().astype(float), at.numpy() + self._origin
+        search = self._searches.get(other)
+        if search is None or search.room < len(chosen):
+            own = self._triangle if other is self else wp.zeros((0, 3), dtype=wp.int32, device="cpu")
+            search = _EdgeSearch(other._mesh, self._settling.inner, own, 2 * len(chosen))
+            self._searches[other] = search
+        depth, at = search.found(self.edge[chosen])
+        return depth.astype(float), at + self._origin
 
     def near(self, box: Array) -> Index:
         """Edges that may reach into a box, int32."""
@@ -171,7 +205,7 @@ class Skin:
 
     def samples(self, chosen: Index) -> Array:
         """Ends and middles of chosen edges, moved into the body [m], shape (sample_count, 3), float64."""
-        inner = self._inner.numpy() + self._origin
+        inner = self._settling.inner.numpy() + self._origin
         ends = inner[self.edge[chosen]]
         return np.concatenate([inner[np.unique(self.edge[chosen])], ends.mean(axis=1)])
 
