@@ -108,8 +108,10 @@ def lagging_vectors(c: Finished, most: float) -> Iterator[Values]:
     """Energy that internal vectors of `hex8i`, `hex8w` or `wedge6` lost as they lagged, over the plastic work."""
     energy = c.ledger.energy()
     spent, plastic = energy["hourglass"], energy["plastic"]
-    if plastic > 0.0 and spent > most * max(plastic, energy["elastic"]) and all(
-        getattr(ELEMENTS[block.element], "lags", False) for block in c.model.blocks if block.plastic
+    if (
+        plastic > 0.0
+        and spent > most * max(plastic, energy["elastic"])
+        and all(getattr(ELEMENTS[block.element], "lags", False) for block in c.model.blocks if block.plastic)
     ):
         yield dict(hourglass=spent, share=spent / plastic)
 
