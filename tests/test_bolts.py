@@ -276,3 +276,30 @@ def test_without_a_reach_an_end_takes_the_cell_around_it_where_cells_are_coarse(
     assert bar.weight[: bar.middle].sum() == pytest.approx(1.0)
     with pytest.raises(mca.RequestError, match="0 nodes of lid within reach"):
         begun(clamped(loads=(replace(thin, at=(0.0, 0.0, 0.1)),)))
+
+
+def test_an_end_between_coarse_cells_lies_in_their_middle():
+    """It was held by one of the four around it: a plate that was pulled along its bolt turned."""
+    plate = mca.Box(size=(0.04, 0.04, 0.004), divisions=(4, 4, 2))
+    steel = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
+    low, high = (
+        mca.Body(name=name, geometry=plate, material=steel, position=(0, 0, z))
+        for name, z in (("a", 0.0), ("b", 0.005))
+    )
+    result = mca.run(
+        mca.Scene(
+            name="pulled",
+            bodies=(low, high),
+            fixed=(mca.Fixed(body="a", nodes="zmin"),),
+            loads=(
+                replace(BOLT, body="b", at=(0.02, 0.02, 0.004), other="a", other_at=(0.02, 0.02, 0.0)),
+                mca.Force(body="b", nodes="zmax", force=(0.0, 0.0, 2e3), spread="area"),
+            ),
+            probes=(mca.Probe(name="b", body="b", nodes="zmin"),),
+            impact=mca.ImpactPhase(duration=1e-4, output_interval=1e-5),
+        ),
+        figures="none",
+    )
+    moved = result.probes[0].position[-1] - result.probes[0].position[0]
+    assert moved[2] > 5e-7 and np.abs(moved[:2]).max() < 1e-6 * moved[2]
+    assert result["bolt_bolt1_shear_N"].max() < 1e-4 * result["bolt_bolt1_N"].max()

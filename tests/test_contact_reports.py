@@ -144,6 +144,15 @@ def test_a_run_whose_bodies_never_touch_says_so():
     assert warning.startswith("no contact closed in the simulated time")
 
 
+def test_glued_bodies_that_general_contact_does_not_touch_warn_of_nothing():
+    low, high = block("a"), block("b", y=EDGE)
+    glued = mca.Contact(
+        slave=mca.Surface(body="b", nodes="ymin"), master=mca.Surface(body="a", nodes="ymax"), bond=mca.Bond()
+    )
+    scene = replace(falling(low, duration=5e-6), bodies=(low, high), contacts=(glued, mca.ContactAll()))
+    assert not mca.run(scene, figures="none").warnings
+
+
 def test_a_finished_impact_and_a_scene_without_contact_warn_of_nothing():
     whole = mca.run(falling(block("a")))
     assert whole.summary["touched"] and not whole.summary["contact_open_at_end"]

@@ -233,7 +233,7 @@ def _(beyond: bool) -> list[str]:
 @pair(energy.lagging_vectors)
 def _(beyond: bool) -> list[str]:
     model = SimpleNamespace(blocks=[SimpleNamespace(element="hex8i", plastic=True)])
-    sums = {"hourglass": over(energy.lagging_vectors, beyond), "plastic": 1.0}
+    sums = {"hourglass": over(energy.lagging_vectors, beyond), "plastic": 1.0, "elastic": 1.0}
     return told(energy.lagging_vectors, model=model, ledger=ledger(energy=lambda: sums))
 
 

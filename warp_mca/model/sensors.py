@@ -121,7 +121,8 @@ def _cut(section: Section, mesh: Mesh) -> Cut:
     normal = np.array(section.normal) / np.linalg.norm(section.normal)
     cut = Cut(section.body, 0, (mesh.points - np.array(section.at)) @ normal)
     if not len(cut.interface(list(mesh.cells.values()))[1]):
-        remedy = f"the plane leaves all of body {section.body} on one side; give a point inside it, in its own frame"
+        own = f"the plane leaves all of body {section.body} on one side, where cells belong to that of their middle"
+        remedy = f"{own}; give a point farther inside, in its own frame"
         raise bad_value(f"{section.title}.at", section.at, remedy)
     return cut
 

@@ -103,7 +103,7 @@ class HalfSteps:
         bodies = np.array([waiting[body.own[0]] for body in model.rigid_bodies], dtype=bool)
         self.waiting = self.moving = [waiting, bodies, bodies]
         self.falling, self.clock = falling, self.state.steps
-        self.rise = self._tighten(True)
+        self.rise = self._settle(True)
         self.quarter, self.since = 0.0, 0
         self.seen: list[Array] = []
         self.now = before, after = self._half_steps()
@@ -125,9 +125,9 @@ class HalfSteps:
         if self.falling:
             self.waiting, self.places = [np.zeros_like(mask) for mask in self.moving], []
 
-    def _tighten(self, on: bool) -> float:
-        """Let bolts be tightened, or no more; the time that this takes [s]."""
-        return max((getattr(self.solver, kind).tighten(on) for kind in self.solver.model.loads), default=0.0)
+    def _settle(self, on: bool) -> float:
+        """Tell loads that bodies settle, or no more; the time that bolts take to be tightened [s]."""
+        return max((getattr(self.solver, kind).settle(on) for kind in self.solver.model.loads), default=0.0)
 
     def look(self) -> float:
         """Kinetic energy of the bodies that settle, the mean of those half a step before and after [J].
@@ -207,7 +207,7 @@ class HalfSteps:
             parameters.assign(values)
         self.held.release()
         self.relaxed.release()
-        self._tighten(False)
+        self._settle(False)
         self.waiting = self.moving
         kept, state = scene_run.ledger.kept, self.state
         self.look()

@@ -171,7 +171,8 @@ class Settle:
 
     Bodies without an initial velocity move until they rest; those that have one wait where they are, and take it when
     the impact begins. The others are damped in proportion to mass, and the ledger books that energy as `damping`.
-    A `Bolt` is tightened meanwhile, and a `Prony` series relaxes at once: what rests has the moduli of a long time.
+    A `Bolt` is tightened meanwhile, and a `Prony` series relaxes at once, as the branches of a loss factor do: what
+    rests has the moduli of a long time.
 
     Attributes:
         duration: the run stops if they do not rest by then [s].

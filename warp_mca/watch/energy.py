@@ -102,14 +102,16 @@ def soft_preload(c: Finished, most: float) -> Iterator[Values]:
     "{hourglass:.2g} J, {share:.1%} of the plastic work, went to internal vectors, which lag a step behind the flow:",
     "lower time_step_scale, with which it goes down, and compare",
     0.03,
-    "of the plastic work at most",
+    "of the plastic work at most, and of the strain energy",
 )
 def lagging_vectors(c: Finished, most: float) -> Iterator[Values]:
     """Energy that internal vectors of `hex8i`, `hex8w` or `wedge6` lost as they lagged, over the plastic work."""
     energy = c.ledger.energy()
     spent, plastic = energy["hourglass"], energy["plastic"]
-    if spent > most * plastic > 0.0 and all(
-        getattr(ELEMENTS[block.element], "lags", False) for block in c.model.blocks if block.plastic
+    if (
+        plastic > 0.0
+        and spent > most * max(plastic, energy["elastic"])
+        and all(getattr(ELEMENTS[block.element], "lags", False) for block in c.model.blocks if block.plastic)
     ):
         yield dict(hourglass=spent, share=spent / plastic)
 

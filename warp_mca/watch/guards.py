@@ -53,8 +53,8 @@ def overflowed_list(c: Reading, _: float) -> Iterator[Values]:
 
 @flag(
     "stopped before t = {time:.4g} s: a node outran the contact search;",
-    "choose a smaller output_interval, or, where no body is so fast, other cells under the contact, since these have "
-    "given way, or, between soft bodies alike, mu and two_way=True",
+    "choose a smaller output_interval, or, where no body is so fast, penalty=10 and two_way=True, since springs were "
+    "pressed deep, or other cells under the contact, since these have given way",
 )
 def outrun_search(c: Reading, _: float) -> Iterator[Values]:
     """Way of nodes since the latest search for contact, against that for which lists of faces hold."""
@@ -82,9 +82,10 @@ def energy_imbalance(c: Reading, _: float) -> Iterator[Values]:
     """Initial energy and external work, less all that is accounted for, over their sum."""
     if c.sums is not None and c.balance:
         ledger, (share, scale) = c.ledger, c.balance
+        cause, remedy = ledger.cause(c.sums)
         yield dict(
             percent=100.0 * share, time=ledger.time(-1), tolerance=ledger.tolerance, scale=scale,
-            cause=ledger.cause(c.sums), remedy=ledger.remedy,
+            cause=cause, remedy=remedy,
         )  # fmt: skip
 
 

@@ -23,8 +23,8 @@ ALONG = 0.99  # cosine from which on an axis is taken as that of a plane of symm
 
 @row("no contact closed in the simulated time:", "give a longer duration, or check positions and speeds")
 def no_contact(c: Finished, _: float) -> Iterator[Values]:
-    """Whether any contact of a scene with contacts was touched."""
-    contacts = _loose(c)
+    """Whether any contact of a scene with contacts was touched, but of a general one beside bonds."""
+    contacts = _loose(c, safety_net=False)
     if contacts and not any(contact.touched for contact in contacts):
         yield {}
 
@@ -117,9 +117,11 @@ def _reported(c: Finished) -> Iterator[tuple[int, ContactHistory, Array, Array]]
             yield k, contact, *axes
 
 
-def _loose(c: Finished) -> list[ContactHistory]:
-    """Contacts without a bond, which holds nodes whether they press or not."""
+def _loose(c: Finished, safety_net: bool = True) -> list[ContactHistory]:
+    """Contacts without a bond, which holds nodes whether they press or not; beside bonds a general one is a net."""
     glued = {item.contact for item in c.model.passes if item.bonds is not None}
+    if glued and not safety_net:
+        glued |= {item.contact for item in c.model.passes if item.pairs is not None}
     return [contact for k, contact in enumerate(c.contacts) if k not in glued]
 
 

@@ -37,7 +37,7 @@ from warp_mca.model.viscosity import thermal_energy
 from warp_mca.system.columns import added_columns, column_count
 from warp_mca.system.records import SceneRecords
 from warp_mca.watch.guards import Reading, stop
-from warp_mca.watch.remedies import imbalance_remedy
+from warp_mca.watch.remedies import imbalance_remedy, let_go, pair_of
 from warp_mca.watch.row import When
 
 if TYPE_CHECKING:
@@ -167,8 +167,8 @@ class Ledger:
         made = self.springs(sums)[..., MADE]
         return made - (self.springs(self.kept.sums[0])[:, MADE] if self.kept.sums else made[:1])
 
-    def cause(self, sums: Array) -> str:
-        """The contact whose springs made most of a record's imbalance, if one did."""
+    def cause(self, sums: Array) -> tuple[str, str]:
+        """The contact whose springs made or lost most of a record's imbalance, if one did, and what helps."""
         energy = self._energies(sums)
         work = energy.pop("external_work")
         net = float(sum(energy.values(), np.zeros(())) - work - self.initial_energy)
@@ -178,13 +178,10 @@ class Ledger:
             share = float(made[own].sum())
             if share * net > MOSTLY * net * net:
                 item = self.model.passes[own.index(True)]
-                master = "a plane" if item.plane is not None else self._body(int(item.master[0]))
-                return f", of which contact springs of {self._body(int(item.slave[0]))} on {master} made {share:.3g} J"
-        return ""
-
-    def _body(self, node: int) -> str:
-        """The body that has a node."""
-        return max((first, name) for name, first in self.model.node_start.items() if first <= node)[1]
+                did = f"{'lost' if share < 0.0 else 'made'} {abs(share):.3g} J"
+                remedy = let_go(item) if share < 0.0 and item.plane is None else self.remedy
+                return f", of which contact springs of {pair_of(self.model, item)} {did}", remedy
+        return "", self.remedy
 
     def _balance(self, sums: Array) -> tuple[Array, Array, Array]:
         """Imbalance of each row of sums; what counts of it; both over initial energy and external work [-]; these [J].

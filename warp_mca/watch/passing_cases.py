@@ -35,8 +35,8 @@ APART = (
 )
 PARTS = "no contact keeps them apart; take contacts='all', or a ContactAll beside the contacts that are listed"
 BETWEEN = (
-    "contact springs are pressed so deep, or nodes of a master pass between those of a coarser slave; let nodes lie "
-    "closer where the bodies meet, and do not set two_way=False"
+    "contact springs are pressed so deep, or nodes of a master pass between those of a coarser slave; give a listed "
+    "contact penalty=10 and two_way=True, or let nodes lie closer where the bodies meet"
 )
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from warp_mca.system.contact import ContactPass
     from warp_mca.system.model import Model
 
 MEETING = 0.05  # of the master's smallest edge: nodes of both surfaces so near to each other meet
@@ -25,6 +26,27 @@ def imbalance_remedy(model: Model, touched: bool, turned: bool) -> str:
     if turned:
         found += ", choose --precision float64 for bodies that turn so far"
     return found
+
+
+def pair_of(model: Model, item: ContactPass) -> str:
+    """What a contact keeps apart."""
+    if item.pairs is not None:
+        return "general contact"
+
+    def body(node: int) -> str:
+        return max((first, name) for name, first in model.node_start.items() if first <= node)[1]
+
+    return f"{body(int(item.slave[0]))} on {'a plane' if item.plane is not None else body(int(item.master[0]))}"
+
+
+def let_go(item: ContactPass) -> str:
+    """What helps where springs of a contact between bodies lost energy.
+
+    A node that slides off an edge leaves that of its spring behind, which goes with the square of its depth.
+    """
+    both = "" if item.pairs is not None else " and give two_way=True"
+    cause = "since springs that are pressed deep let go of nodes at edges"
+    return f"raise its penalty, as to 10{both}, {cause}, or lower time_step_scale"
 
 
 def _meet_at_corners(model: Model) -> bool:

@@ -36,6 +36,7 @@ __all__ = ["BoltNodes", "Stage", "build"]
 
 RISE = 2.0  # times in which a wave runs along the shank and its seat while the preload grows [-]
 FLAT = 0.05  # of the spread of an end's nodes: directions in which they spread less do not carry its corners [-]
+ALIKE = 1e-6  # by which cells may be farther from an end than the nearest one and hold it, too [-]
 End = tuple[Index, Array]  # nodes, and the weight of each in each corner [-], shape (3, count), float64
 
 
@@ -133,7 +134,7 @@ def _end(assembly: Bodies, load: Bolt, key: str, body: str, place: Array, ring: 
     if not assembly.scene.body(body).rigid:
         part = part[np.linalg.norm(assembly.X[part] - place, axis=1) <= reach]
         if load.reach is None and not _spans(assembly, part):
-            part = _cell_around(assembly, body, place)
+            part = _cells_around(assembly, body, place)
     part = part[assembly.mass[part] > 0.0]
     X, mass = assembly.X[part], assembly.mass[part]
     offset = X - mass @ X / mass.sum() if len(part) else X
@@ -156,8 +157,11 @@ def _spans(assembly: Bodies, part: Index) -> bool:
     return bool(spread[1] > FLAT * spread[0])
 
 
-def _cell_around(assembly: Bodies, body: str, place: Array) -> Index:
-    """Nodes of the cell of a body whose middle is nearest to a place, within the ball around its nodes; none beyond."""
+def _cells_around(assembly: Bodies, body: str, place: Array) -> Index:
+    """Nodes of the cells of a body whose middles are nearest to a place that lies in the ball around their nodes.
+
+    They are several where it lies on a node or edge of cells alike, so that the end stays in their middle.
+    """
     start, best, found = assembly.node_start[body], np.inf, np.zeros(0, np.int32)
     for cells in assembly.meshes[body].cells.values():
         if not len(cells):
@@ -167,7 +171,8 @@ def _cell_around(assembly: Bodies, body: str, place: Array) -> Index:
         away = np.linalg.norm(middle - place, axis=1)
         k = int(away.argmin())
         if away[k] < best and away[k] <= np.linalg.norm(corner[k] - middle[k], axis=1).max():
-            best, found = float(away[k]), np.unique(cells[k] + start).astype(np.int32)
+            best, alike = float(away[k]), away <= (1.0 + ALIKE) * away[k]
+            found = np.unique(cells[alike] + start).astype(np.int32)
     return found
 
 

@@ -51,7 +51,7 @@ class BoltsStage(SpringsStage):
         own.tightens = wp.zeros(1, dtype=wp.int32)
         self.shanks = own
 
-    def tighten(self, on: bool) -> float:
+    def settle(self, on: bool) -> float:
         """Bolts are tightened from now on, or no more; the longest rise of their preloads [s]."""
         self.shanks.tightens.fill_(int(on))
         return max(item.rise for item in self.items)

@@ -66,7 +66,7 @@ class DampingStage(NodalLoad):
         own.gain = wp.array(np.concatenate([np.zeros(0), *(item.gain for item in items)]), dtype=wp.float64)
         own.keep = wp.array(np.exp(-ratio), dtype=wp.float64)
         own.share = wp.array(-np.expm1(-ratio) / ratio, dtype=wp.float64)
-        self.bodies = own
+        self.bodies, self.share = own, np.array(own.share.numpy())
         self.node = wp.array(np.concatenate([item.node for item in items]), dtype=wp.int32)
         self.body = wp.array(np.repeat(np.arange(len(items)), counts), dtype=wp.int32)
         # bodies that cannot turn, with nothing relative to their motion, need none
@@ -92,6 +92,11 @@ class DampingStage(NodalLoad):
             taken=wp.zeros(self.count, dtype=wp.float64),
             clock=wp.zeros(self.count, dtype=wp.int32),
         )
+
+    def settle(self, on: bool) -> float:
+        """Branches relax at once from now on, or no more: what rests has the moduli of slow loads."""
+        self.bodies.share.assign(0.0 * self.share if on else self.share)
+        return 0.0
 
     def kernels(self) -> list[Any]:
         """That of the nodes."""

@@ -71,8 +71,8 @@ class NodalLoad(Actor):
         """Of each of `Load.readings` at t(n), an entry for each load, shape (len(items),), float64."""
         return []
 
-    def tighten(self, on: bool) -> float:
-        """Whether a phase before the impact brings on preloads, from now on; how long that takes [s]."""
+    def settle(self, on: bool) -> float:
+        """A phase before the impact begins to let bodies settle, or has done so; how long preloads take to come [s]."""
         return 0.0
 
     def feel(self, state: State, ahead: State, way: Array) -> None:
