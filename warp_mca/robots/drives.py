@@ -33,17 +33,15 @@ def refuse_at_hand_off(machine: Machine) -> None:
         dofs = slice(int(model.jnt_dofadr[k]), int(model.jnt_dofadr[k]) + machine.rates_of(k))
         if (least := float(model.dof_damping[dofs].min())) < 0.0:
             raise bad_value(f"damping of joint {names.joint(k)}", least, "it drives the joint; give 0 or more")
-        several = dofs.stop - dofs.start > 1
         free = int(model.jnt_type[k]) == int(mj.mjtJoint.mjJNT_FREE)
         for what, value in (
             ("stiffness", model.jnt_stiffness[k]),
             ("armature", model.dof_armature[dofs].max()),
             ("frictionloss", model.dof_frictionloss[dofs].max()),
-            ("damping", model.dof_damping[dofs].max() if free else 0.0),
-            ("range", model.jnt_limited[k]),
+            ("damping", model.dof_damping[dofs].max()),
         ):
-            if several and value:
-                remedy = "an impact carries it for hinges and slides; leave it out, or give hinges that meet"
+            if free and value:
+                remedy = "an impact carries it for joints between links; leave it out, or give slides and a ball"
                 raise bad_value(f"{what} of joint {names.joint(k)}", float(value), remedy)
 
 
@@ -65,8 +63,11 @@ class Drive(NamedTuple):
 NO_DRIVE = Drive(0.0, 0.0, 0.0, None)
 
 
-def freedom_of(machine: Machine, joint: int, qpos: Array, gearing: Gearing) -> Freedom:
+def freedoms_of(machine: Machine, joint: int, qpos: Array, gearing: Gearing) -> tuple[Freedom, ...]:
     """The freedom of a joint of the file, at coordinates `qpos`, with what tendons and equalities do to it.
+
+    A ball with a spring, dry friction or a rotor is three hinges along the axes of its link, which is right to first
+    order in what it turns in the impact.
 
     Positions count from the pose in which axes are given, so that `ref` of the file is taken off.
 
@@ -77,7 +78,7 @@ def freedom_of(machine: Machine, joint: int, qpos: Array, gearing: Gearing) -> F
     kind, at = int(model.jnt_type[joint]), tuple(float(v) for v in model.jnt_pos[joint])
     dof, place = int(model.jnt_dofadr[joint]), int(model.jnt_qposadr[joint])
     if kind == int(mj.mjtJoint.mjJNT_BALL):
-        return Freedom(kind="ball", at=at, damping=float(model.dof_damping[dof]))  # type: ignore[arg-type]
+        return _ball(machine, joint, qpos[place : place + 4])
     zero = float(model.qpos0[place])
     motor, beside = _motor(machine, joint, zero, gearing)
     stiffness, rest, slowed = gearing.spring(
@@ -91,7 +92,7 @@ def freedom_of(machine: Machine, joint: int, qpos: Array, gearing: Gearing) -> F
         low, high = (float(v) - zero for v in model.jnt_range[joint])
         found = {"limits": (low, high), "limit_stiffness": float(machine.limit_stiffness[k])}
         found |= {"limit_damping": float(machine.limit_damping[k])}
-    return Freedom(
+    own = Freedom(
         kind="slide" if kind == int(mj.mjtJoint.mjJNT_SLIDE) else "hinge",
         axis=tuple(float(v) for v in model.jnt_axis[joint]),  # type: ignore[arg-type]
         at=at,  # type: ignore[arg-type]
@@ -106,6 +107,23 @@ def freedom_of(machine: Machine, joint: int, qpos: Array, gearing: Gearing) -> F
         follows=gearing.coupler(joint),
         **found,
     )
+    return (own,)
+
+
+def _ball(machine: Machine, joint: int, quaternion: Array) -> tuple[Freedom, ...]:
+    """The freedoms of a ball: its spring gives -k r, r the rotation vector from rest in the link's frame."""
+    model, dof = machine.model, int(machine.model.jnt_dofadr[joint])
+    stiffness, armature = float(model.jnt_stiffness[joint]), float(model.dof_armature[dof])
+    damping, friction = float(model.dof_damping[dof]), float(model.dof_frictionloss[dof])
+    at: Any = tuple(float(v) for v in model.jnt_pos[joint])
+    if not (stiffness or armature or friction):
+        return (Freedom(kind="ball", at=at, damping=damping),)
+    turned, place = np.zeros(3), int(model.jnt_qposadr[joint])
+    machine.mj.mju_subQuat(turned, quaternion, model.qpos_spring[place : place + 4])
+    own: dict[str, Any] = {"at": at, "stiffness": stiffness, "damping": damping, "armature": armature}
+    own |= {"friction": friction, "friction_rate": FRICTION_RATE}
+    axes: Any = np.eye(3).tolist()
+    return tuple(Freedom(axis=tuple(axis), rest=-float(r), **own) for axis, r in zip(axes, turned, strict=True))
 
 
 def _motor(

@@ -28,13 +28,14 @@ class Gearing:
         """Read equalities and tendons; `duration` of the impact [s] says how much of what is held would change.
 
         Raises:
-            RequestError: a joint is held at a place or geared twice, or springs of a tendon are not carried.
+            RequestError: a joint is geared twice, or springs of a tendon are not carried.
         """
         self._machine, self._duration = machine, duration
         self._leader: dict[int, tuple[int, float]] = {}
-        for k in range(machine.model.neq):
-            if machine.model.eq_active0[k] and int(machine.model.eq_type[k]) == int(machine.mj.mjtEq.mjEQ_JOINT):
-                self._gear(k)
+        kind, model = int(machine.mj.mjtEq.mjEQ_JOINT), machine.model
+        equalities = [k for k in range(model.neq) if model.eq_active0[k] and int(model.eq_type[k]) == kind]
+        for k in sorted(equalities, key=lambda k: int(model.eq_obj2id[k]) < 0):  # those that hold a joint come last
+            self._gear(k)
         self._drives: dict[int, list[Drive]] = {}
         self._springs: dict[int, list[tuple[float, float, float]]] = {}
         for tendon in range(machine.model.ntendon):
@@ -68,8 +69,8 @@ class Gearing:
         machine, model = self._machine, self._machine.model
         name, (one, other) = machine.names.equality(k), (int(model.eq_obj1id[k]), int(model.eq_obj2id[k]))
         if other < 0:
-            remedy = f"it holds joint {machine.names.joint(one)} at a place; leave that joint out, which welds its link"
-            raise bad_value("Robot: equality", name, remedy)
+            self._fix(name, self._root(one)[0])
+            return
         place, dof = int(model.jnt_qposadr[other]), int(model.jnt_dofadr[other])
         p = np.polynomial.Polynomial(model.eq_data[k, :5])
         x, rate = float(machine.data.qpos[place] - model.qpos0[place]), float(machine.data.qvel[dof])
@@ -87,6 +88,16 @@ class Gearing:
             )
             warn([f"{text}; the file's polynomial is linear there"])
 
+    def _fix(self, name: str, joint: int) -> None:
+        """Keep a joint where it is: it follows another one at a ratio of 0."""
+        machine = self._machine
+        scalar = np.flatnonzero(machine.model.jnt_type >= int(machine.mj.mjtJoint.mjJNT_SLIDE)).tolist()
+        others = [other for other in scalar if self._root(other)[0] != joint]
+        if not others:
+            remedy = f"it holds joint {machine.names.joint(joint)}, and no other one moves; leave out that joint"
+            raise bad_value("Robot: equality", name, remedy)
+        self._leader[joint] = (others[0], 0.0)
+
     def _root(self, joint: int) -> tuple[int, float]:
         """The joint that leads a joint in the end, and the rate of the one over that of the other."""
         factor = 1.0
@@ -98,7 +109,7 @@ class Gearing:
     def _pull(self, tendon: int) -> None:
         """Take a tendon: its actuators, spring and damper."""
         machine, model = self._machine, self._machine.model
-        parts = list(_parts(machine, tendon))
+        parts = [(joint, c) for joint, c in _parts(machine, tendon) if self._root(joint)[1]]
         actuators = [] if machine.passive else _actuators(machine, tendon)
         stiffness, damping = float(model.tendon_stiffness[tendon]), float(model.tendon_damping[tendon])
         if not parts or not (actuators or stiffness or damping):
