@@ -439,11 +439,16 @@ def test_flexible_links_on_balls_and_in_free_flight_come_back(tmp_path):
             'stiffness="3" springref="0.3"',
             '<position joint="h" kp="30" forcerange="-2 2"/><position joint="h" kp="9"/>',
         ),
+        ("", '<position joint="h" kp="30" forcerange="-2 2"/><velocity joint="h" kv="0.4" forcerange="-0.9 0.9"/>'),
+        (
+            'stiffness="2"',
+            '<position joint="h" kp="30" kv="1" forcerange="-9 9"/><position joint="h" kp="20" forcerange="-12 1.5"/>',
+        ),
         ('actuatorfrcrange="-5 5"', '<position joint="h" kp="3"/><velocity joint="h" kv="0.4"/>'),
     ],
 )
 def test_actuators_that_share_a_joint_act_together(tmp_path, joint, actuators):
-    """One clamp beside drives without, or one clamp of all: the impact goes on as the swing does."""
+    """One clamp beside drives without, a clamp of each, or one of all: the impact goes on as the swing does."""
     text = f"""<mujoco><option gravity="0 0 0"/><worldbody><body><joint name="h" {joint}/><geom size="0.1" mass="1"/>
       </body></worldbody><actuator>{actuators}</actuator></mujoco>"""
     machine = robot(text, tmp_path, qvel={"h": 2.0}, ctrl=(-0.2, -0.9))
@@ -453,12 +458,3 @@ def test_actuators_that_share_a_joint_act_together(tmp_path, joint, actuators):
     wanted = machine.swing(t_end=back.robot.clock).qvel
     assert back.robot.qvel == pytest.approx(wanted, rel=2e-4)
     assert abs(wanted[0] - 2.0) > 0.5
-
-
-def test_two_clamps_that_move_are_refused(tmp_path):
-    text = """<mujoco><worldbody><body><joint name="h"/><geom size="0.1" mass="1"/></body></worldbody><actuator>
-      <position joint="h" kp="3" forcerange="-2 2"/><velocity joint="h" kv="1" forcerange="-1 1"/>
-      </actuator></mujoco>"""
-    machine = robot(text, tmp_path)
-    with pytest.raises(mca.RequestError, match="actuators of joint = 'h': actuators whose force follows position or"):
-        machine.strike(impact=IMPACT, swing=machine.swing(t_end=1e-3))

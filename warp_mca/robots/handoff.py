@@ -73,7 +73,8 @@ class HandOff:
         for k in range(model.neq):
             if model.eq_active0[k] and int(model.eq_type[k]) != int(self.machine.mj.mjtEq.mjEQ_JOINT):
                 self._add_loop(k)
-        self.bodies += contacts.beside()
+        self.bodies += [*self._gearing.bodies, *contacts.beside()]
+        self.joints += self._gearing.joints
         gravity, loads = gravity_of(self.robot, self.machine, REST)
         touch = self.swing.touch
         facts: dict[str, object] = {"robot": str(self.robot.path), "swing": self.swing.t_end}
