@@ -42,7 +42,7 @@ def refuse_at_hand_off(machine: Machine) -> None:
             ("damping", model.dof_damping[dofs].max()),
         ):
             if free and value:
-                remedy = "an impact carries it for joints between links; leave it out, or give slides and a ball"
+                remedy = "an impact carries it for joints between links; leave it out, as <freejoint/> does"
                 raise bad_value(f"{what} of joint {names.joint(k)}", float(value), remedy)
 
 
