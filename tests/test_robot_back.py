@@ -66,11 +66,15 @@ BALLS = """<mujoco><compiler angle="radian"/><worldbody>
       <inertial pos="0.03 0.01 -0.1" mass="0.5" diaginertia="0.004 0.005 0.002"/></body></body></worldbody></mujoco>"""
 SOCKETS = BALLS.replace('damping="0.02"', 'damping="0.02" stiffness="3" armature="0.02" frictionloss="0.02"')
 SOCKETS = SOCKETS.replace('name="t" type="ball"', 'name="t" type="ball" stiffness="0.7" armature="0.003"')
-# A joint that is held, and one that follows it.
-HELD = (
-    BALLS.replace('name="s" type="ball" damping="0.02"', 'name="h" axis="0.1 1 0"')
-    .replace('name="t" type="ball"', 'name="x" type="slide" axis="1 0 0"/><joint name="k" axis="0 1 0.3"')
-    .replace("</mujoco>", '<equality><joint joint1="x" polycoef="0.02"/></equality></mujoco>')
+# A joint that is held, twice and with two drives, between others.
+HELD = BALLS.replace('name="s" type="ball" damping="0.02"', 'name="h" axis="0.1 1 0"').replace(
+    'name="t" type="ball"', 'name="x" type="slide" axis="1 0 0"/><joint name="k" axis="0 1 0.3"'
+)
+HELD = HELD.replace(
+    "</mujoco>",
+    """<equality><joint joint1="x" polycoef="0.02"/><joint joint1="x" polycoef="0.02"/></equality><actuator>
+      <position joint="x" kp="9" forcerange="-2 2"/><velocity joint="x" kv="1" forcerange="-1 1"/>
+      </actuator></mujoco>""",
 )
 CART = """<mujoco><compiler angle="radian" autolimits="true"/><worldbody>
   <body name="cart"><joint name="x" type="slide" axis="1 0.2 0" range="-1 0.01" damping="1"/>

@@ -89,7 +89,9 @@ class Gearing:
         machine, model = self._machine, self._machine.model
         name, (one, other) = machine.names.equality(k), (int(model.eq_obj1id[k]), int(model.eq_obj2id[k]))
         if other < 0:
-            self._fix(name, self._root(one)[0])
+            root, factor = self._root(one)
+            if factor:  # else it is held already
+                self._fix(name, root)
             return
         place, dof = int(model.jnt_qposadr[other]), int(model.jnt_dofadr[other])
         p = np.polynomial.Polynomial(model.eq_data[k, :5])

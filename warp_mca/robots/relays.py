@@ -33,7 +33,7 @@ def relay(
         parts: joints of the file, c of each, and a coupler to it at that ratio.
         carried: what acts on x, slides whose position and axis are set here.
     """
-    model, data, mobility = machine.model, machine.data, np.diag(machine.mobility())
+    model, data, mobility = machine.model, machine.data, np.diag(np.linalg.inv(machine.mass_matrix()))
     places = [int(model.jnt_qposadr[joint]) for joint, _, _ in parts]
     dofs = [int(model.jnt_dofadr[joint]) for joint, _, _ in parts]
     ratios = [c for _, c, _ in parts]
