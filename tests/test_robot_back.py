@@ -125,6 +125,32 @@ def test_balls_with_springs_friction_and_rotors_go_on_to_first_order(tmp_path):
     assert np.array(back.robot.qvel) == pytest.approx(later.qvel, abs=5e-3)
 
 
+def test_a_ball_stops_at_its_range_in_swings_and_impacts(tmp_path):
+    """Depth of a critically damped stop, v / (e w), after 1 / w in it; turned back at -3 v exp(-4) after 4 / w."""
+    ball = BALLS.replace('type="ball" damping="0.02"', 'type="ball" limited="true" range="0 0.5"', 1)
+    ball = ball[: ball.index('<body name="b"')] + "</body></worldbody></mujoco>"
+    ball = ball.replace('pos="0.02 0 -0.1"', 'pos="0 0 0"').replace("0.01 0.012 0.004", "0.01 0.01 0.01")
+    ball = ball.replace("<worldbody>", '<option gravity="0 0 0"/><worldbody>')
+    n, v, w = np.array([0.6, 0.0, 0.8]), 3.0, 2000.0
+    half = 0.5 * 0.49
+    start = {"qpos": (np.cos(half), *(np.sin(half) * n)), "qvel": tuple(v * n)}
+    machine = robot(ball, tmp_path, **start)
+    angle = lambda q: 2.0 * np.arctan2(np.linalg.norm(q[1:]), q[0])  # noqa: E731
+    reached = 0.01 / v
+    assert angle(machine.swing(t_end=reached + 1.0 / w).qpos) == pytest.approx(0.5 + v / (np.e * w), abs=1e-9)
+    assert machine.swing(t_end=reached + 4.0 / w).qvel @ n == pytest.approx(-3.0 * v * np.exp(-4.0), rel=1e-6)
+    swing = machine.swing(t_end=2e-3)
+    scene = machine.strike(impact=replace(IMPACT, duration=3e-3, output_interval=1e-6), swing=swing)
+    back = machine.after(swing, scene, mca.run(scene, precision="float64"))
+    later = machine.swing(t_end=back.robot.clock)
+    assert np.array(back.robot.qvel) == pytest.approx(later.qvel, abs=2e-3)
+    assert np.array(back.robot.qpos) == pytest.approx(later.qpos, abs=1e-6)
+    with pytest.raises(
+        mca.RequestError, match=r"Robot\.qpos of joint s \[rad\] = 0\.6: start within its range of 0\.5"
+    ):
+        robot(ball, tmp_path, qpos=(np.cos(0.3), *(np.sin(0.3) * n))).swing(t_end=1e-3)
+
+
 def test_what_does_not_come_back_is_refused(tmp_path):
     machine = robot(CHAIN, tmp_path, **START)
     swing = machine.swing(t_end=0.02)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -10,12 +11,14 @@ import numpy as np
 from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.robots.machine import FRICTION_RATE
+from warp_mca.robots.sockets import axes_of, turned
 from warp_mca.scene import Amplitude, Freedom, PositionServo
 
 if TYPE_CHECKING:
     from warp_mca.robots.gearing import Gearing
     from warp_mca.robots.machine import Machine
 
+NEVER = 1e3  # position that no hinge reaches in an impact [rad]
 SOFT = 1e-9  # stiffness of the servo that stands for a constant torque with clamps, over that torque [1/rad, 1/m]
 
 
@@ -81,8 +84,8 @@ class Motors(NamedTuple):
 def freedoms_of(machine: Machine, joint: int, qpos: Array, gearing: Gearing) -> tuple[Freedom, ...]:
     """The freedom of a joint of the file, at coordinates `qpos`, with what tendons and equalities do to it.
 
-    A ball with a spring, dry friction or a rotor is three hinges along the axes of its link, which is right to first
-    order in what it turns in the impact.
+    A ball with a spring, dry friction, a rotor or a range is three hinges, the first along the axis about which it is
+    turned; that is right to first order in what it turns in the impact.
 
     Positions count from the pose in which axes are given, so that `ref` of the file is taken off.
 
@@ -132,14 +135,22 @@ def _ball(machine: Machine, joint: int, quaternion: Array) -> tuple[Freedom, ...
     stiffness, armature = float(model.jnt_stiffness[joint]), float(model.dof_armature[dof])
     damping, friction = float(model.dof_damping[dof]), float(model.dof_frictionloss[dof])
     at: Any = tuple(float(v) for v in model.jnt_pos[joint])
-    if not (stiffness or armature or friction):
+    socket = next((item for item in machine.sockets if item.joint == joint), None)
+    if not (stiffness or armature or friction or socket):
         return (Freedom(kind="ball", at=at, damping=damping),)
-    turned, place = np.zeros(3), int(model.jnt_qposadr[joint])
-    machine.mj.mju_subQuat(turned, quaternion, model.qpos_spring[place : place + 4])
+    rotated, place = np.zeros(3), int(model.jnt_qposadr[joint])
+    machine.mj.mju_subQuat(rotated, quaternion, model.qpos_spring[place : place + 4])
     own: dict[str, Any] = {"at": at, "stiffness": stiffness, "damping": damping, "armature": armature}
     own |= {"friction": friction, "friction_rate": FRICTION_RATE}
-    axes: Any = np.eye(3).tolist()
-    return tuple(Freedom(axis=tuple(axis), rest=-float(r), **own) for axis, r in zip(axes, turned, strict=True))
+    axes = axes_of(quaternion)
+    freedoms = [
+        Freedom(axis=tuple(axis), rest=-float(r), **own) for axis, r in zip(axes.tolist(), axes @ rotated, strict=True)
+    ]
+    if socket:
+        left = socket.most - turned(quaternion)[0]
+        limit: dict[str, Any] = {"limit_stiffness": socket.stiffness, "limit_damping": socket.damping}
+        freedoms[0] = replace(freedoms[0], limits=(-NEVER, left), **limit)
+    return tuple(freedoms)
 
 
 def _motor(machine: Machine, joint: int, zero: float, gearing: Gearing) -> Motors:

@@ -64,7 +64,7 @@ class Stepper:
             self.stiff = True
             self.begin(solver.t, solver.y, self._until)
             solver = self._solver
-        pace = machine.pace(solver.y[machine.nq : self._count])
+        pace = _pace(machine, solver.y[machine.nq : self._count])
         solver.max_step = MAX_TURN_PER_STEP / pace if pace > 0.0 else math.inf
         before = solver.t
         message = solver.step()
@@ -122,3 +122,11 @@ class Stepper:
             beside[k] += way
             found[:, k] = (self._machine.rates(t, beside) - at) / way
         return found
+
+
+def _pace(machine: Machine, v: Array) -> float:
+    """Rate at which frames turn or cross the machine [rad/s], for the longest step."""
+    model, slide = machine.model, int(machine.mj.mjtJoint.mjJNT_SLIDE)
+    extent = max(float(model.stat.extent), 1e-9)
+    rates = np.abs(np.where(model.jnt_type[model.dof_jntid] == slide, v / extent, v))
+    return float(max(rates.max(initial=0.0), np.sqrt(np.linalg.norm(model.opt.gravity) / extent)))
