@@ -89,7 +89,7 @@ class Machine:
         self.limited_q, self._friction = self.model.jnt_qposadr[joints], self.model.dof_frictionloss.copy()
         self.ctrl = np.zeros(self.model.nu)
         self.start = start_of(self, robot)
-        mobility = np.diag(np.linalg.inv(regular(self)))
+        mobility = np.asarray(np.diag(np.linalg.inv(regular(self))), dtype=np.float64)
         inertia = 1.0 / mobility[self.limited]
         self.limit_stiffness = inertia * LIMIT_RATE**2
         self.limit_damping = 2.0 * inertia * LIMIT_RATE

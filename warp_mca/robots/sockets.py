@@ -63,7 +63,7 @@ def turned(quaternion: Array) -> tuple[float, Array]:
     w, v = float(quaternion[0]), np.asarray(quaternion[1:], dtype=np.float64)
     sine = float(np.linalg.norm(v))
     angle = 2.0 * float(np.arctan2(sine, abs(w)))
-    return angle, np.copysign(1.0, w) * v / sine if angle > STILL else np.zeros(3)
+    return angle, v / (sine if w >= 0.0 else -sine) if angle > STILL else np.zeros(3)
 
 
 def axes_of(quaternion: Array) -> Array:
@@ -73,4 +73,4 @@ def axes_of(quaternion: Array) -> Array:
         return np.eye(3)
     across = np.cross(n, np.eye(3)[int(np.abs(n).argmin())])
     across /= np.linalg.norm(across)
-    return np.array([n, across, np.cross(n, across)])
+    return np.array([n, across, np.cross(n, across)], dtype=np.float64)
