@@ -64,6 +64,18 @@ BALLS = """<mujoco><compiler angle="radian"/><worldbody>
     <inertial pos="0.02 0 -0.1" mass="1" diaginertia="0.01 0.012 0.004"/>
     <body name="b" pos="0 0 -0.2" quat="0.9 0.1 0.2 0.3"><joint name="t" type="ball"/>
       <inertial pos="0.03 0.01 -0.1" mass="0.5" diaginertia="0.004 0.005 0.002"/></body></body></worldbody></mujoco>"""
+SOCKETS = BALLS.replace('damping="0.02"', 'damping="0.02" stiffness="3" armature="0.02" frictionloss="0.02"')
+SOCKETS = SOCKETS.replace('name="t" type="ball"', 'name="t" type="ball" stiffness="0.7" armature="0.003"')
+# A joint that is held, twice and with two drives, between others.
+HELD = BALLS.replace('name="s" type="ball" damping="0.02"', 'name="h" axis="0.1 1 0"').replace(
+    'name="t" type="ball"', 'name="x" type="slide" axis="1 0 0"/><joint name="k" axis="0 1 0.3"'
+)
+HELD = HELD.replace(
+    "</mujoco>",
+    """<equality><joint joint1="x" polycoef="0.02"/><joint joint1="x" polycoef="0.02"/></equality><actuator>
+      <position joint="x" kp="9" forcerange="-2 2"/><velocity joint="x" kv="1" forcerange="-1 1"/>
+      </actuator></mujoco>""",
+)
 CART = """<mujoco><compiler angle="radian" autolimits="true"/><worldbody>
   <body name="cart"><joint name="x" type="slide" axis="1 0.2 0" range="-1 0.01" damping="1"/>
     <inertial pos="0 0.01 0" mass="2" diaginertia="0.01 0.01 0.01"/>
@@ -80,6 +92,7 @@ PIECES = {
     "rotors": (CHAIN.replace('armature="0.001"', 'armature="0.02"'), START, 0.02),
     "loop": (FOUR_BAR, {"qvel": LOOP}, 0.02),
     "balls": (BALLS, {"qvel": (1.0, 2.0, 3.0, -2.0, 1.0, 4.0), "qpos": {"s": (0.8, 0.6, 0.0, 0.0)}}, 0.02),
+    "held": (HELD, {"qvel": {"h": 1.0, "k": -2.0}, "qpos": {"x": 0.02}}, 0.02),
     "friction": (STOP.replace('range="-1 0.5"', DRY), {"qvel": (0.5,)}, 0.01),
     "limit": (CART, {"qvel": (1.2, 3.0, -2.0), "ctrl": (2.0, 1.5)}, 0.009),
 }
@@ -98,6 +111,44 @@ def test_an_impact_without_a_touch_is_a_piece_of_the_swing(tmp_path, name):
     assert np.array(back.robot.qpos) == pytest.approx(later.qpos, abs=1e-8)
     assert np.array(back.robot.qvel) == pytest.approx(later.qvel, abs=1e-5)
     assert abs(back.vibration) < 1e-9
+
+
+def test_balls_with_springs_friction_and_rotors_go_on_to_first_order(tmp_path):
+    """Three hinges stand for each: off by 2e-4 of the way of 5 mrad; without its springs it would be by 1e-2."""
+    start = {"qvel": (1.0, 2.0, 3.0, -2.0, 1.0, 4.0), "qpos": {"s": (0.8, 0.6, 0.0, 0.0)}}
+    machine = robot(SOCKETS, tmp_path, **start)
+    swing = machine.swing(t_end=0.02)
+    scene = machine.strike(impact=replace(IMPACT, duration=1e-3, output_interval=1e-5), swing=swing)
+    back = machine.after(swing, scene, mca.run(scene, precision="float64"))
+    later = machine.swing(t_end=back.robot.clock)
+    assert np.array(back.robot.qpos) == pytest.approx(later.qpos, abs=1e-6)
+    assert np.array(back.robot.qvel) == pytest.approx(later.qvel, abs=5e-3)
+
+
+def test_a_ball_stops_at_its_range_in_swings_and_impacts(tmp_path):
+    """Depth of a critically damped stop, v / (e w), after 1 / w in it; turned back at -3 v exp(-4) after 4 / w."""
+    ball = BALLS.replace('type="ball" damping="0.02"', 'type="ball" limited="true" range="0 0.5"', 1)
+    ball = ball[: ball.index('<body name="b"')] + "</body></worldbody></mujoco>"
+    ball = ball.replace('pos="0.02 0 -0.1"', 'pos="0 0 0"').replace("0.01 0.012 0.004", "0.01 0.01 0.01")
+    ball = ball.replace("<worldbody>", '<option gravity="0 0 0"/><worldbody>')
+    n, v, w = np.array([0.6, 0.0, 0.8]), 3.0, 2000.0
+    half = 0.5 * 0.49
+    start = {"qpos": (np.cos(half), *(np.sin(half) * n)), "qvel": tuple(v * n)}
+    machine = robot(ball, tmp_path, **start)
+    angle = lambda q: 2.0 * np.arctan2(np.linalg.norm(q[1:]), q[0])  # noqa: E731
+    reached = 0.01 / v
+    assert angle(machine.swing(t_end=reached + 1.0 / w).qpos) == pytest.approx(0.5 + v / (np.e * w), abs=1e-9)
+    assert machine.swing(t_end=reached + 4.0 / w).qvel @ n == pytest.approx(-3.0 * v * np.exp(-4.0), rel=1e-6)
+    swing = machine.swing(t_end=2e-3)
+    scene = machine.strike(impact=replace(IMPACT, duration=3e-3, output_interval=1e-6), swing=swing)
+    back = machine.after(swing, scene, mca.run(scene, precision="float64"))
+    later = machine.swing(t_end=back.robot.clock)
+    assert np.array(back.robot.qvel) == pytest.approx(later.qvel, abs=2e-3)
+    assert np.array(back.robot.qpos) == pytest.approx(later.qpos, abs=1e-6)
+    with pytest.raises(
+        mca.RequestError, match=r"Robot\.qpos of joint s \[rad\] = 0\.6: start within its range of 0\.5"
+    ):
+        robot(ball, tmp_path, qpos=(np.cos(0.3), *(np.sin(0.3) * n))).swing(t_end=1e-3)
 
 
 def test_what_does_not_come_back_is_refused(tmp_path):

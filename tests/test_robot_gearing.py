@@ -60,11 +60,16 @@ def test_springs_of_tendons_and_gears_of_gears(tmp_path):
     assert (way > 1e-4).all() and np.abs(off).max() < 2e-5 * way.min()
 
 
-def test_a_tendon_of_joints_that_are_free_of_each_other_is_held_and_says_so(tmp_path, caplog):
-    text = HAND.format(spring="", coef=0.5, equality="", limits="", kv=0)
-    machine = robot(text, tmp_path, qpos=START, qvel={"l": 0.4, "r": -0.3}, ctrl={"grip": 2.0})
-    off, way, _ = apart(machine, warned="they would change by 0.38 N", caplog=caplog)
-    assert np.abs(off[1:]).max() < 0.02 * way[1:].min()
+@pytest.mark.parametrize("limits", ['forcerange="-100 100"', 'forcerange="-4 4"', ""])
+def test_a_tendon_of_joints_that_are_free_of_each_other_pulls_them_on(tmp_path, limits):
+    """Its spring, damper and actuator follow its length, 0.5 l + 0.7 r + 0.1 shoulder."""
+    spring = ' stiffness="2e3" damping="20" springlength="0.003"'
+    text = HAND.format(spring=spring, coef=0.7, equality="", limits=limits, kv=30)
+    text = text.replace("</fixed>", '<joint joint="shoulder" coef="0.1"/></fixed>')
+    machine = robot(text, tmp_path, qpos=START, qvel={"l": 0.4, "r": -0.3, "shoulder": 0.5}, ctrl={"grip": 2.0})
+    off, way, result = apart(machine)
+    assert (way > 1e-4).all() and np.abs(off).max() < 2e-5 * way.min()
+    assert result.summary["energy_error"] < 1e-6
 
 
 def test_a_polynomial_is_linear_in_an_impact_and_says_so(tmp_path, caplog):

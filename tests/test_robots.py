@@ -181,11 +181,6 @@ def test_skin_says_the_side_at_edges_and_corners():
             '<tendon><spatial><site site="a"/><site site="b"/></spatial></tendon>',
             "spatial tendons",
         ),
-        (
-            '<worldbody><body><joint name="socket" type="ball" limited="true" range="0 0.5"/><geom size="0.1"/>'
-            "</body></worldbody>",
-            "joint socket is a ball with a range",
-        ),
         ('<actuator><muscle name="m" joint="hinge" lengthrange="0 1"/></actuator>', "activations"),
         ('<actuator><position name="m" joint="hinge" kp="1" timeconst="0.1"/></actuator>', "activations"),
     ],

@@ -89,6 +89,7 @@ CATCHES: dict[str, tuple[str, ...]] = {
     "jointed_strike": ("rotor_halved", "joint_forgets_second"),
     "four_bar_loop": ("joint_forgets_second",),
     "slider_and_cross": ("freedoms_in_reverse",),
+    "gears": ("gear_pulls_half",),
     "joint_drives": ("rotor_halved",),
     "rigid_ball": ("reaction_halved", "contact_soft"),
     "arm_strike": ("drives_let_go",),

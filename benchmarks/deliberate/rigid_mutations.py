@@ -53,4 +53,10 @@ RIGID_MUTATIONS: dict[str, Mutation] = {
         "        step_out.twist[r] = -t\n",
         "        step_out.twist[r] = wp.float64(0.0) * t\n",
     ),
+    "gear_pulls_half": Mutation(
+        "couplers give the freedom that leads half of its reaction",
+        "kernels/nodes/couplers.py",
+        "    return -rows.ratio[r]\n",
+        "    return wp.float64(-0.5) * rows.ratio[r]\n",
+    ),
 }

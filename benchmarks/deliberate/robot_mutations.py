@@ -26,8 +26,8 @@ ROBOT_MUTATIONS: dict[str, Mutation] = {
     "touch_at_the_end_of_the_step": Mutation(
         "a machine touches at the end of the step in which a gap closes",
         "warp_mca/robots/swing.py",
-        "self.times.append(solver.t if touch is None else touch[0])",
-        "self.times.append(solver.t)",
+        "self.times.append(stepper.t if touch is None else touch[0])",
+        "self.times.append(stepper.t)",
     ),
     "drives_let_go": Mutation(
         "drives of a machine do not act during an impact",

@@ -19,6 +19,7 @@ from warp_mca.model.stable_step import BOUNCE, USUAL_SCALE
 from warp_mca.physics.rigid.bodies import Rigid
 from warp_mca.scene import Contact, RigidPlane, Scene
 from warp_mca.system.bodies import GROUND
+from warp_mca.system.body_joints import BodyJoint
 from warp_mca.system.rigid import RigidBody
 from warp_mca.system.time_step import StableStep
 
@@ -81,26 +82,48 @@ def stable_with_rigid(parts: Assembly, rigid: Rigid, added: Array, velocity: Arr
 def _stiffest(rigid: Rigid) -> tuple[float, int]:
     """Largest eigenvalue [1/s^2] of free rigid bodies on the springs of their joints, and a body that moves with it.
 
-    Springs of limits count WHOLE times, others ACCURATE times. What joints hold moves less, and rotors make it slower.
+    Springs of limits count WHOLE times, others ACCURATE times. What joints hold moves less, and rotors make it slower;
+    motions are those that couplers allow.
     """
     count = 6 * len(rigid.rigid_bodies)
     K, most = np.zeros((count, count)), (0.0, 0)
     for item in rigid.body_joints:
-        screws, k = item.screws(), ACCURATE * item.drive[:, [STIFFNESS, KP]].sum(axis=1)
-        k += WHOLE * item.drive[:, LIMIT_STIFFNESS]
-        for F, stiffness, A in zip(np.linalg.pinv(screws).T, k, item.drive[:, ARMATURE], strict=True):
-            row = np.zeros(count)
-            for b, sign in ((item.body, 1.0), (item.other, -1.0)):
-                if b != GROUND and stiffness > 0.0:
-                    body = rigid.rigid_bodies[b]
-                    moment = item.length * F[:3] + np.cross(item.place - body.centre, F[3:])
-                    half = np.linalg.cholesky(np.linalg.inv(body.inertia)).T
-                    row[6 * b : 6 * b + 6] = sign * np.concatenate([F[3:] / math.sqrt(body.mass), half @ moment])
+        k = ACCURATE * item.drive[:, [STIFFNESS, KP]].sum(axis=1) + WHOLE * item.drive[:, LIMIT_STIFFNESS]
+        for row, stiffness, A in zip(_gradients(rigid, item), k, item.drive[:, ARMATURE], strict=True):
             K += stiffness / (1.0 + A * (row @ row)) * np.outer(row, row)
     if K.any():
-        values, vectors = np.linalg.eigh(K)
-        most = float(values[-1]), int(np.abs(vectors[:, -1]).argmax()) // 6
+        allowed = _allowed(rigid, count)
+        values, vectors = np.linalg.eigh(allowed.T @ K @ allowed)
+        most = float(values[-1]), int(np.abs(allowed @ vectors[:, -1]).argmax()) // 6
     return most
+
+
+def _gradients(rigid: Rigid, joint: BodyJoint) -> Array:
+    """Rates of a joint over momenta of unit energy of all bodies, shape (rate_count, 6 body_count), float64."""
+    screws = np.linalg.pinv(joint.screws()).T
+    found = np.zeros((len(screws), 6 * len(rigid.rigid_bodies)))
+    for row, F in zip(found, screws, strict=True):
+        for b, sign in ((joint.body, 1.0), (joint.other, -1.0)):
+            if b != GROUND:
+                body = rigid.rigid_bodies[b]
+                moment = joint.length * F[:3] + np.cross(joint.place - body.centre, F[3:])
+                half = np.linalg.cholesky(np.linalg.inv(body.inertia)).T
+                row[6 * b : 6 * b + 6] = sign * np.concatenate([F[3:] / math.sqrt(body.mass), half @ moment])
+    return found
+
+
+def _allowed(rigid: Rigid, count: int) -> Array:
+    """Motions that couplers allow, orthonormal, shape (count, motion_count), float64; all of them without couplers."""
+    gears = [row for row in rigid.rigid_rows if row.geared >= 0]
+    if not gears:
+        return np.eye(count)
+    rows = []
+    for row in gears:
+        own, other = (_gradients(rigid, rigid.body_joints[k]) for k in (row.geared, row.leader))
+        tied = own[row.rates[0]] - row.ratio * other[row.rates[1]]
+        rows.append(tied / np.linalg.norm(tied))
+    _, sizes, turned = np.linalg.svd(np.array(rows))
+    return turned[int((sizes > 1e-9).sum()) :].T
 
 
 def _largest(body: RigidBody, X: Array, stiffness: Array) -> float:

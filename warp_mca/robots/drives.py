@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -9,12 +11,14 @@ import numpy as np
 from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.robots.machine import FRICTION_RATE
+from warp_mca.robots.sockets import axes_of, turned
 from warp_mca.scene import Amplitude, Freedom, PositionServo
 
 if TYPE_CHECKING:
     from warp_mca.robots.gearing import Gearing
     from warp_mca.robots.machine import Machine
 
+NEVER = 1e3  # position that no hinge reaches in an impact [rad]
 SOFT = 1e-9  # stiffness of the servo that stands for a constant torque with clamps, over that torque [1/rad, 1/m]
 
 
@@ -33,17 +37,15 @@ def refuse_at_hand_off(machine: Machine) -> None:
         dofs = slice(int(model.jnt_dofadr[k]), int(model.jnt_dofadr[k]) + machine.rates_of(k))
         if (least := float(model.dof_damping[dofs].min())) < 0.0:
             raise bad_value(f"damping of joint {names.joint(k)}", least, "it drives the joint; give 0 or more")
-        several = dofs.stop - dofs.start > 1
         free = int(model.jnt_type[k]) == int(mj.mjtJoint.mjJNT_FREE)
         for what, value in (
             ("stiffness", model.jnt_stiffness[k]),
             ("armature", model.dof_armature[dofs].max()),
             ("frictionloss", model.dof_frictionloss[dofs].max()),
-            ("damping", model.dof_damping[dofs].max() if free else 0.0),
-            ("range", model.jnt_limited[k]),
+            ("damping", model.dof_damping[dofs].max()),
         ):
-            if several and value:
-                remedy = "an impact carries it for hinges and slides; leave it out, or give hinges that meet"
+            if free and value:
+                remedy = "an impact carries it for joints between links; leave it out, as <freejoint/> does"
                 raise bad_value(f"{what} of joint {names.joint(k)}", float(value), remedy)
 
 
@@ -65,8 +67,25 @@ class Drive(NamedTuple):
 NO_DRIVE = Drive(0.0, 0.0, 0.0, None)
 
 
-def freedom_of(machine: Machine, joint: int, qpos: Array, gearing: Gearing) -> Freedom:
+class Motors(NamedTuple):
+    """What drives a coordinate in an impact.
+
+    Attributes:
+        motor: of its freedom.
+        beside: spring about 0 and damper beside it.
+        more: servos with clamps of their own, for which it has no room.
+    """
+
+    motor: Amplitude | PositionServo | None
+    beside: Drive
+    more: tuple[PositionServo, ...]
+
+
+def freedoms_of(machine: Machine, joint: int, qpos: Array, gearing: Gearing) -> tuple[Freedom, ...]:
     """The freedom of a joint of the file, at coordinates `qpos`, with what tendons and equalities do to it.
+
+    A ball with a spring, dry friction, a rotor or a range is three hinges, the first along the axis about which it is
+    turned; that is right to first order in what it turns in the impact.
 
     Positions count from the pose in which axes are given, so that `ref` of the file is taken off.
 
@@ -77,9 +96,10 @@ def freedom_of(machine: Machine, joint: int, qpos: Array, gearing: Gearing) -> F
     kind, at = int(model.jnt_type[joint]), tuple(float(v) for v in model.jnt_pos[joint])
     dof, place = int(model.jnt_dofadr[joint]), int(model.jnt_qposadr[joint])
     if kind == int(mj.mjtJoint.mjJNT_BALL):
-        return Freedom(kind="ball", at=at, damping=float(model.dof_damping[dof]))  # type: ignore[arg-type]
+        return _ball(machine, joint, qpos[place : place + 4])
     zero = float(model.qpos0[place])
-    motor, beside = _motor(machine, joint, zero, gearing)
+    motor, beside, more = _motor(machine, joint, zero, gearing)
+    gearing.carry(joint, more)
     stiffness, rest, slowed = gearing.spring(
         joint, float(model.jnt_stiffness[joint]), float(model.qpos_spring[place]) - zero
     )
@@ -91,7 +111,7 @@ def freedom_of(machine: Machine, joint: int, qpos: Array, gearing: Gearing) -> F
         low, high = (float(v) - zero for v in model.jnt_range[joint])
         found = {"limits": (low, high), "limit_stiffness": float(machine.limit_stiffness[k])}
         found |= {"limit_damping": float(machine.limit_damping[k])}
-    return Freedom(
+    own = Freedom(
         kind="slide" if kind == int(mj.mjtJoint.mjJNT_SLIDE) else "hinge",
         axis=tuple(float(v) for v in model.jnt_axis[joint]),  # type: ignore[arg-type]
         at=at,  # type: ignore[arg-type]
@@ -106,57 +126,92 @@ def freedom_of(machine: Machine, joint: int, qpos: Array, gearing: Gearing) -> F
         follows=gearing.coupler(joint),
         **found,
     )
+    return (own,)
 
 
-def _motor(
-    machine: Machine, joint: int, zero: float, gearing: Gearing
-) -> tuple[Amplitude | PositionServo | None, Drive]:
-    """What drives a joint during an impact at held controls, and the spring about 0 and damping that go with it.
+def _ball(machine: Machine, joint: int, quaternion: Array) -> tuple[Freedom, ...]:
+    """The freedoms of a ball: its spring gives -k r, r the rotation vector from rest in the link's frame."""
+    model, dof = machine.model, int(machine.model.jnt_dofadr[joint])
+    stiffness, armature = float(model.jnt_stiffness[joint]), float(model.dof_armature[dof])
+    damping, friction = float(model.dof_damping[dof]), float(model.dof_frictionloss[dof])
+    at: Any = tuple(float(v) for v in model.jnt_pos[joint])
+    socket = next((item for item in machine.sockets if item.joint == joint), None)
+    if not (stiffness or armature or friction or socket):
+        return (Freedom(kind="ball", at=at, damping=damping),)
+    rotated, place = np.zeros(3), int(model.jnt_qposadr[joint])
+    machine.mj.mju_subQuat(rotated, quaternion, model.qpos_spring[place : place + 4])
+    own: dict[str, Any] = {"at": at, "stiffness": stiffness, "damping": damping, "armature": armature}
+    own |= {"friction": friction, "friction_rate": FRICTION_RATE}
+    axes = axes_of(quaternion)
+    freedoms = [
+        Freedom(axis=tuple(axis), rest=-float(r), **own) for axis, r in zip(axes.tolist(), axes @ rotated, strict=True)
+    ]
+    if socket:
+        left = socket.most - turned(quaternion)[0]
+        limit: dict[str, Any] = {"limit_stiffness": socket.stiffness, "limit_damping": socket.damping}
+        freedoms[0] = replace(freedoms[0], limits=(-NEVER, left), **limit)
+    return tuple(freedoms)
 
-    Of actuators that share a joint one at most has a clamp that moves: the constant of the others moves its clamp, and
-    what they follow is a spring and a damper.
+
+def _motor(machine: Machine, joint: int, zero: float, gearing: Gearing) -> Motors:
+    """What drives a joint during an impact at held controls.
 
     Raises:
-        RequestError: several actuators with clamps drive it, or one drives it away from rest.
+        RequestError: several actuators with clamps drive it whose sum has one, or one drives it away from rest.
     """
     model, name = machine.model, machine.names.joint(joint)
     tendon, own = int(machine.mj.mjtTrn.mjTRN_TENDON), model.actuator_trnid[:, 0] == joint
     drives = [drive_of(machine, int(k), 1.0, zero) for k in np.flatnonzero(own & (model.actuator_trntype != tendon))]
     drives += gearing.drives(joint)
     if machine.passive or not drives:
-        return None, NO_DRIVE
-    drives = [_held(drive) for drive in drives]
-    clamped = [drive for drive in drives if drive.limits]
-    if len(clamped) > 1:
-        remedy = "actuators whose force follows position or rate within a forcerange share it; give it one of these"
-        raise bad_value("Robot: actuators of joint", name, remedy)
-    free = _sum([drive for drive in drives if not drive.limits])
+        return Motors(None, NO_DRIVE, ())
     if model.jnt_actfrclimited[joint]:  # effort of a URDF
+        drives = [held(drive) for drive in drives]
         low, high = (float(v) for v in model.jnt_actfrcrange[joint])
+        clamped = [drive for drive in drives if drive.limits]
         if clamped and len(drives) > 1:
             remedy = "actuators that share a joint whose sum is clamped are not carried; give the joint one"
             raise bad_value(f"actuatorfrcrange of joint {name}", (low, high), remedy)
-        if clamped:
-            least, most = clamped[0].limits or (-np.inf, np.inf)
-            low, high, free = max(low, least), min(high, most), clamped[0]
-        clamped, free = [_held(free._replace(limits=(low, high)))], NO_DRIVE
-    motor, beside = (clamped[0], free) if clamped else (free, NO_DRIVE)
-    if min(motor.kp, motor.kv, beside.kp, beside.kv) < 0.0:
+        whole = clamped[0] if clamped else _sum(drives)
+        least, most = whole.limits or (-np.inf, np.inf)
+        drives = [whole._replace(limits=(max(low, least), min(high, most)))]
+    return motors("Robot: actuators of joint", name, drives)
+
+
+def motors(what: str, name: str, drives: Sequence[Drive]) -> Motors:
+    """Drives of one coordinate as motors.
+
+    One with a clamp that moves is the motor: the constant of those without moves its clamp, and what they follow is a
+    spring and a damper. Further ones with such clamps are motors of their own.
+
+    Raises:
+        RequestError: one drives it away from rest.
+    """
+    drives = [held(drive) for drive in drives]
+    clamped, free = [drive for drive in drives if drive.limits], _sum([drive for drive in drives if not drive.limits])
+    if any(min(drive.kp, drive.kv) < 0.0 for drive in (*clamped, free)):
         remedy = "it drives the joint away from where it is; give a servo with kp and kv of 0 or above"
-        raise bad_value("Robot: actuators of joint", name, remedy)
-    if motor.limits and beside.constant:
-        low, high = (limit + beside.constant for limit in motor.limits)
-        motor = motor._replace(constant=motor.constant + beside.constant, limits=(low, high))
-    constant, kp, kv, limits = motor
-    if kp == 0.0 and limits is None:
-        motion = Drive(0.0, beside.kp, beside.kv + kv, None)
-        return (Amplitude(times=(0.0,), values=(constant,)) if constant else None), motion
-    if kp == 0.0:
-        kp = SOFT * max(abs(constant), 1.0)
-    return PositionServo(kp=kp, kv=kv, target=constant / kp, limits=limits), beside
+        raise bad_value(what, name, remedy)
+    if not clamped and free.kp:
+        return Motors(_servo(free), NO_DRIVE, ())
+    if not clamped:
+        table = Amplitude(times=(0.0,), values=(free.constant,)) if free.constant else None
+        return Motors(table, free, ())
+    first, *others = clamped
+    if free.constant:
+        low, high = (limit + free.constant for limit in first.limits or ())
+        first = first._replace(constant=first.constant + free.constant, limits=(low, high))
+    return Motors(_servo(first), free, tuple(map(_servo, others)))
 
 
-def _held(drive: Drive) -> Drive:
+def _servo(drive: Drive) -> PositionServo:
+    """The servo with the torque of a drive."""
+    constant, kp, kv, limits = drive
+    kp = kp or SOFT * max(abs(constant), 1.0)
+    return PositionServo(kp=kp, kv=kv, target=constant / kp, limits=limits)
+
+
+def held(drive: Drive) -> Drive:
     """A drive that follows nothing, as the constant torque that its clamp leaves; others as they are."""
     if drive.limits is None or drive.kp or drive.kv:
         return drive

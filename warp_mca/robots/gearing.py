@@ -2,41 +2,49 @@
 
 Joints that equalities gear to each other move as one: q_i = f_i q + g_i of the one that none of them leads. A tendon of
 such joints has the length l = pull q + zero, with pull = sum c_i f_i, and its tension is a torque of `pull` times as
-much there. Impulses of couplers carry it to the others.
+much there. Impulses of couplers carry it to the others. Tendons of joints that are free of each other act on a relay.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from warp_mca.base.errors import bad_value
 from warp_mca.base.log import warn
-from warp_mca.robots.drives import Drive, drive_of
-from warp_mca.scene import Coupler
+from warp_mca.robots.drives import Drive, drive_of, motors
+from warp_mca.robots.relays import relay
+from warp_mca.scene import Articulation, Body, Coupler, Freedom, PositionServo
 
 if TYPE_CHECKING:
     from warp_mca.robots.machine import Machine
 
 
 class Gearing:
-    """Couplers and tendons of a machine at its hand-off, whose data is up to date."""
+    """Couplers and tendons of a machine at its hand-off, whose data is up to date.
+
+    Attributes:
+        bodies, joints: of relays.
+    """
 
     def __init__(self, machine: Machine, duration: float) -> None:
         """Read equalities and tendons; `duration` of the impact [s] says how much of what is held would change.
 
         Raises:
-            RequestError: a joint is held at a place or geared twice, or springs of a tendon are not carried.
+            RequestError: a joint is geared twice, or springs of a tendon are not carried.
         """
         self._machine, self._duration = machine, duration
         self._leader: dict[int, tuple[int, float]] = {}
-        for k in range(machine.model.neq):
-            if machine.model.eq_active0[k] and int(machine.model.eq_type[k]) == int(machine.mj.mjtEq.mjEQ_JOINT):
-                self._gear(k)
+        kind, model = int(machine.mj.mjtEq.mjEQ_JOINT), machine.model
+        equalities = [k for k in range(model.neq) if model.eq_active0[k] and int(model.eq_type[k]) == kind]
+        for k in sorted(equalities, key=lambda k: int(model.eq_obj2id[k]) < 0):  # those that hold a joint come last
+            self._gear(k)
         self._drives: dict[int, list[Drive]] = {}
         self._springs: dict[int, list[tuple[float, float, float]]] = {}
+        self.bodies: list[Body] = []
+        self.joints: list[Articulation] = []
         for tendon in range(machine.model.ntendon):
             self._pull(tendon)
 
@@ -44,11 +52,24 @@ class Gearing:
         """That of a joint, or None."""
         if joint not in self._leader:
             return None
-        leader, ratio = self._leader[joint]
+        return self._coupled(*self._leader[joint])
+
+    def _coupled(self, leader: int, ratio: float) -> Coupler:
         model = self._machine.model
         link = int(model.jnt_bodyid[leader])
         number = 1 + leader - int(model.body_jntadr[link])
         return Coupler(joint=joint_name(self._machine, link), freedom=number, ratio=ratio)
+
+    def carry(self, joint: int, servos: Sequence[PositionServo]) -> None:
+        """Give further motors of a joint to a relay."""
+        if servos:
+            parts = [(joint, 1.0, self._coupled(joint, 1.0))]
+            self._relay(f"{self._machine.names.joint(joint)} drive", parts, [Freedom(motor=item) for item in servos])
+
+    def _relay(self, name: str, parts: list[tuple[int, float, Coupler]], carried: list[Freedom]) -> None:
+        bodies, joints = relay(self._machine, name, parts, carried)
+        self.bodies += bodies
+        self.joints += joints
 
     def drives(self, joint: int) -> list[Drive]:
         """Torques of actuators of tendons on a joint."""
@@ -68,8 +89,10 @@ class Gearing:
         machine, model = self._machine, self._machine.model
         name, (one, other) = machine.names.equality(k), (int(model.eq_obj1id[k]), int(model.eq_obj2id[k]))
         if other < 0:
-            remedy = f"it holds joint {machine.names.joint(one)} at a place; leave that joint out, which welds its link"
-            raise bad_value("Robot: equality", name, remedy)
+            root, factor = self._root(one)
+            if factor:  # else it is held already
+                self._fix(name, root)
+            return
         place, dof = int(model.jnt_qposadr[other]), int(model.jnt_dofadr[other])
         p = np.polynomial.Polynomial(model.eq_data[k, :5])
         x, rate = float(machine.data.qpos[place] - model.qpos0[place]), float(machine.data.qvel[dof])
@@ -87,6 +110,16 @@ class Gearing:
             )
             warn([f"{text}; the file's polynomial is linear there"])
 
+    def _fix(self, name: str, joint: int) -> None:
+        """Keep a joint where it is: it follows another one at a ratio of 0."""
+        machine = self._machine
+        scalar = np.flatnonzero(machine.model.jnt_type >= int(machine.mj.mjtJoint.mjJNT_SLIDE)).tolist()
+        others = [other for other in scalar if self._root(other)[0] != joint]
+        if not others:
+            remedy = f"it holds joint {machine.names.joint(joint)}, and no other one moves; leave out that joint"
+            raise bad_value("Robot: equality", name, remedy)
+        self._leader[joint] = (others[0], 0.0)
+
     def _root(self, joint: int) -> tuple[int, float]:
         """The joint that leads a joint in the end, and the rate of the one over that of the other."""
         factor = 1.0
@@ -98,7 +131,7 @@ class Gearing:
     def _pull(self, tendon: int) -> None:
         """Take a tendon: its actuators, spring and damper."""
         machine, model = self._machine, self._machine.model
-        parts = list(_parts(machine, tendon))
+        parts = [(joint, c) for joint, c in _parts(machine, tendon) if self._root(joint)[1]]
         actuators = [] if machine.passive else _actuators(machine, tendon)
         stiffness, damping = float(model.tendon_stiffness[tendon]), float(model.tendon_damping[tendon])
         if not parts or not (actuators or stiffness or damping):
@@ -110,48 +143,42 @@ class Gearing:
                     "a tendon pulls it, whose actuator has limits itself; leave it out",
                 )
                 raise bad_value(f"actuatorfrcrange of joint {name}", True, remedy)
-        roots = {self._root(joint)[0] for joint, _ in parts}
-        if len(roots) > 1:
-            self._hold(tendon, parts, actuators, bool(stiffness or damping))
-            return
-        (root,) = roots
-        pull = sum(c * self._root(joint)[1] for joint, c in parts)
-        place = int(model.jnt_qposadr[root])
-        position = float(machine.data.qpos[place] - model.qpos0[place])
-        zero = float(machine.data.ten_length[tendon]) - pull * position
-        self._drives.setdefault(root, []).extend(drive_of(machine, k, pull, zero) for k in actuators)
+        pulls: dict[int, float] = {}
+        for joint, c in parts:
+            root, factor = self._root(joint)
+            pulls[root] = pulls.get(root, 0.0) + c * factor
+        pulls = {root: pull for root, pull in pulls.items() if pull} or {next(iter(pulls)): 0.0}
+        places = {root: int(model.jnt_qposadr[root]) for root in pulls}
+        ways = [pull * float(machine.data.qpos[places[k]] - model.qpos0[places[k]]) for k, pull in pulls.items()]
+        zero = float(machine.data.ten_length[tendon]) - sum(ways)
         low, high = (float(v) for v in model.tendon_lengthspring[tendon])
         if stiffness and low != high:
             remedy = "its spring is slack between two lengths, which an impact does not carry; give it one springlength"
             raise bad_value("Robot: tendon", machine.names.tendon(tendon), remedy)
+        if len(pulls) > 1:
+            self._join(tendon, pulls, [drive_of(machine, k, 1.0, zero) for k in actuators], low - zero)
+            return
+        ((root, pull),) = pulls.items()
+        self._drives.setdefault(root, []).extend(drive_of(machine, k, pull, zero) for k in actuators)
         if pull and (stiffness or damping):
             own = (stiffness * pull**2, (low - zero) / pull, damping * pull**2)
             self._springs.setdefault(root, []).append(own)
 
-    def _hold(self, tendon: int, parts: list[tuple[int, float]], actuators: list[int], sprung: bool) -> None:
-        """Hold the force of actuators of a tendon whose joints are free of each other, and say what that neglects."""
-        machine, model, data = self._machine, self._machine.model, self._machine.data
+    def _join(self, tendon: int, pulls: dict[int, float], drives: list[Drive], rest: float) -> None:
+        """Give a tendon whose joints are free of each other to a relay, which moves as its length."""
+        machine, model = self._machine, self._machine.model
         name = machine.names.tendon(tendon)
-        if sprung:
-            remedy = (
-                "its joints are free of each other, and an impact carries no spring or damper there; leave these out"
-            )
-            raise bad_value("Robot: tendon", name, remedy)
-        speed = abs(float(data.ten_velocity[tendon]))
-        for k in actuators:
-            force = float(data.actuator_force[k] * model.actuator_gear[k, 0])
-            for joint, c in parts:
-                self._drives.setdefault(joint, []).append(Drive(c * force, 0.0, 0.0, None))
-            law = drive_of(machine, k, 1.0, 0.0)
-            if law.kp or law.kv:
-                change = abs(law.kp) * speed * self._duration
-                text = (
-                    f"actuator {machine.names.actuator(k)} pulls joints that are free of each other, by tendon {name}"
-                )
-                what = (
-                    f"its {force:.4g} N are held in the impact; they would change by {change:.2g} N at the rate before"
-                )
-                warn([f"{text}: {what} and by {abs(law.kv):.3g} N for each m/s that this changes"])
+        found = motors("Robot: tendon", name, drives)
+        spring, damping = float(model.tendon_stiffness[tendon]), float(model.tendon_damping[tendon])
+        stiffness = spring + found.beside.kp
+        own = Freedom(
+            stiffness=stiffness,
+            rest=spring * rest / stiffness if stiffness else 0.0,
+            damping=damping + found.beside.kv,
+            motor=found.motor,
+        )
+        parts = [(root, pull, self._coupled(root, pull)) for root, pull in pulls.items()]
+        self._relay(name, parts, [own, *(Freedom(motor=item) for item in found.more)])
 
 
 def _parts(machine: Machine, tendon: int) -> Iterator[tuple[int, float]]:

@@ -14,6 +14,7 @@ from warp_mca.base.rotation import rotation_matrix, rotation_vector
 from warp_mca.robots.gearing import joint_name
 from warp_mca.robots.handoff import REST
 from warp_mca.robots.machine import Machine
+from warp_mca.robots.sockets import axes_of
 from warp_mca.scene import Body, Scene
 
 if TYPE_CHECKING:
@@ -187,9 +188,21 @@ def _take_joints(machine: Machine, link: int, q: Array, rotor: Array, swing: Rob
         before = ends.rotation(machine.names.body(parent)) if carried else np.eye(3)
         turned = machine.matrix(model.body_quat[link]).T @ before.T @ ends.rotation(name)
         q[at : at + 4] = machine.quaternion(turned)
+        dof = int(model.jnt_dofadr[first])
+        if model.dof_armature[dof]:
+            axes = axes_of(swing.qpos[at : at + 4])
+            rotor[dof : dof + 3] = _turning(axes, *ends.joint(joint_name(machine, link)))
         return
     positions, rates = ends.joint(joint_name(machine, link))
     for k, (position, rate) in enumerate(zip(positions, rates, strict=True)):
         place = int(model.jnt_qposadr[first + k])
         q[place] = position + float(model.qpos0[place])
         rotor[int(model.jnt_dofadr[first + k])] = rate
+
+
+def _turning(axes: Array, positions: Array, rates: Array) -> Array:
+    """Angular velocity in the frame that three hinges along axes in it carry in turn [rad/s], shape (3,)."""
+    found = np.zeros(3)
+    for axis, position, rate in zip(axes, positions, rates, strict=True):
+        found = rotation_matrix(position * axis).T @ found + rate * axis
+    return found

@@ -12,7 +12,7 @@ from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.robots.contacts import Contacts
-from warp_mca.robots.drives import freedom_of, refuse_at_hand_off
+from warp_mca.robots.drives import freedoms_of, refuse_at_hand_off
 from warp_mca.robots.gearing import Gearing, joint_name
 from warp_mca.robots.gravity import gravity_of
 from warp_mca.robots.masses import MassProperties, of_link
@@ -73,7 +73,8 @@ class HandOff:
         for k in range(model.neq):
             if model.eq_active0[k] and int(model.eq_type[k]) != int(self.machine.mj.mjtEq.mjEQ_JOINT):
                 self._add_loop(k)
-        self.bodies += contacts.beside()
+        self.bodies += [*self._gearing.bodies, *contacts.beside()]
+        self.joints += self._gearing.joints
         gravity, loads = gravity_of(self.robot, self.machine, REST)
         touch = self.swing.touch
         facts: dict[str, object] = {"robot": str(self.robot.path), "swing": self.swing.t_end}
@@ -134,10 +135,10 @@ class HandOff:
         body, nodes = self._holder(link, parent)
         other, other_nodes = self._holder(parent, link)
         assert body is not None
-        freedoms = tuple(freedom_of(machine, k, self.swing.qpos, self._gearing) for k in joints)
-        if any(freedom.kind == "ball" for freedom in freedoms) and len(freedoms) > 1:
+        if len(joints) > 1 and any(int(model.jnt_type[k]) == int(machine.mj.mjtJoint.mjJNT_BALL) for k in joints):
             remedy = "a ball beside other joints of one link is not carried; give three hinges, or a link between"
             raise bad_value("Robot: joints of link", self.names.body(link), remedy)
+        freedoms = tuple(item for k in joints for item in freedoms_of(machine, k, self.swing.qpos, self._gearing))
         name = joint_name(machine, link)
         if nodes is not None:  # the frame of a flexible body is not that of its link
             freedoms, at = self._in_frame(body, link, freedoms)

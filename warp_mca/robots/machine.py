@@ -12,6 +12,7 @@ from warp_mca.base.errors import bad_value
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.robots.masses import MassProperties, of_link, regular, rest_of
 from warp_mca.robots.reading import Names, compiled, mujoco, with_masses
+from warp_mca.robots.sockets import sockets_of
 from warp_mca.robots.start import start_of
 from warp_mca.robots.warned import warnings_logged
 
@@ -63,6 +64,7 @@ class Machine:
         passive: whether the file switches all drives off.
         limit_stiffness: of these limits [N m/rad, N/m], float64.
         limit_damping: of these limits [N m s/rad, N s/m], float64.
+        sockets: balls with a range.
     """
 
     @warnings_logged()
@@ -87,9 +89,11 @@ class Machine:
         self.limited_q, self._friction = self.model.jnt_qposadr[joints], self.model.dof_frictionloss.copy()
         self.ctrl = np.zeros(self.model.nu)
         self.start = start_of(self, robot)
-        inertia = 1.0 / np.diag(np.linalg.inv(regular(self)))[self.limited]
+        mobility = np.asarray(np.diag(np.linalg.inv(regular(self))), dtype=np.float64)
+        inertia = 1.0 / mobility[self.limited]
         self.limit_stiffness = inertia * LIMIT_RATE**2
         self.limit_damping = 2.0 * inertia * LIMIT_RATE
+        self.sockets = sockets_of(self, mobility, LIMIT_RATE)
 
     def _rests(self, robot: Robot, spec: Any) -> dict[str, MassProperties]:
         """What flexible links have beyond their meshes; those that have nothing take the mass of the mesh.
@@ -159,6 +163,8 @@ class Machine:
         beyond = at - np.clip(at, self.range[:, 0], self.range[:, 1])
         held = self.limit_stiffness * beyond + self.limit_damping * rate
         force[self.limited] -= np.where(beyond != 0.0, held, 0.0)
+        for socket in self.sockets:
+            force[socket.dof : socket.dof + 3] += socket.push(q, v)
         return force
 
     def advance(self, y: Array) -> Any:
@@ -236,13 +242,6 @@ class Machine:
         J = np.zeros((3, self.nv))
         self.mj.mj_jac(self.model, self.data, J, None, np.asarray(point, dtype=np.float64), body)
         return J
-
-    def pace(self, v: Array) -> float:
-        """Rate at which frames turn or cross the machine [rad/s], for the longest step."""
-        extent = max(float(self.model.stat.extent), 1e-9)
-        slides = np.isin(self.model.jnt_type[self.model.dof_jntid], (int(self.mj.mjtJoint.mjJNT_SLIDE),))
-        rates = np.abs(np.where(slides, v / extent, v))
-        return float(max(rates.max(initial=0.0), np.sqrt(np.linalg.norm(self.model.opt.gravity) / extent)))
 
     def rates_of(self, joint: int) -> int:
         """Number of independent rates of a joint."""

@@ -162,8 +162,6 @@ def _refused(mj: Any, model: Any) -> Iterator[str]:
     for k in range(model.nu):
         yield from (f"actuator {names.actuator(k)}: {text}" for text in _refused_drive(mj, model, k))
     for k in range(model.njnt):
-        if model.jnt_limited[k] and model.jnt_type[k] == int(mj.mjtJoint.mjJNT_BALL):
-            yield f"joint {names.joint(k)} is a ball with a range; leave it out, or give hinges that meet"
         for what in ("jnt_stiffnesspoly", "jnt_springyield"):
             if getattr(model, what, None) is not None and getattr(model, what)[k].any():
                 yield f"joint {names.joint(k)} has a spring that is not linear; give it a stiffness alone"

@@ -138,11 +138,12 @@ class Robot:
 
         Flexible links get their meshes, all others are rigid bodies with the file's mass, centre and inertia. Joints
         are Articulations with springs, dampers, friction, armature, limits and drives, which go on acting at the
-        controls that are held. Joints that equalities gear follow by a `Coupler`; a tendon pulls such joints with its
-        actuators and spring, others with the force it has at the touch. Of the file's geoms those are meshed that may
-        touch within the impact; a round one has a node where it touches first. Geoms of the world are held. What the
-        file's link has beyond the mass of its mesh rides on it as a rigid body, "NAME rest", to which it is mounted;
-        where they differ by no more than 2 %, the link swings with the mass of its mesh.
+        controls that are held. Joints that equalities gear follow by a `Coupler`; a tendon of joints that are free of
+        each other acts on bodies of almost no mass, "NAME relay 1" and so on, which couplers move by its length, as do
+        further actuators of a joint with a clamp of their own. Of the file's geoms those are meshed that may touch
+        within the impact; a round one has a node where it touches first. Geoms of the world are held. What the file's
+        link has beyond the mass of its mesh rides on it as a rigid body, "NAME rest", to which it is mounted; where
+        they differ by no more than 2 %, the link swings with the mass of its mesh.
 
         Args:
             impact: the phase.

@@ -15,14 +15,12 @@ from warp_mca.base.errors import bad_value
 from warp_mca.rigid.touch import Watch
 from warp_mca.robots.machine import Machine
 from warp_mca.robots.nearby import Nearby
+from warp_mca.robots.stepping import Stepper
 from warp_mca.robots.touching import Pair
 
 if TYPE_CHECKING:
     from warp_mca.robots.robot import Robot
 
-TOLERANCE = 1e-10  # relative error of a step: momenta of a free chain drift by 1e-12 in a swing, at half again the cost
-SMALLEST = 1e-3  # of the tolerance, the absolute error of a coordinate
-MAX_TURN_PER_STEP = 0.05  # as of the planar chain: a gap has at most one minimum in a step
 SAMPLE_COUNT = 257  # of the trajectory that is kept
 BEFORE = 1e-7  # gap at which the normal of a touch is taken [m]
 PARTING = 1e-3  # and after an impact [m]: faces of round geoms lie that deep in them, at a radius of 60 mm
@@ -91,8 +89,8 @@ class RobotSwing:
 def swing(robot: Robot, machine: Machine, pairs: Sequence[Pair], t_end: float, *, stops: bool = True) -> RobotSwing:
     """Integrate a machine from its start until two surfaces touch, or to t_end.
 
-    DOP853, as for the planar chain, at relative tolerance TOLERANCE, from sample to sample of the controller. Kinks of
-    the forces, where limits or clamps of drives set in, are met by its error control.
+    DOP853, as for the planar chain, or an implicit scheme where drives are stiff, see `stepping`, from sample to sample
+    of the controller. Kinks of the forces, where limits or clamps of drives set in, are met by error control.
 
     Args:
         robot: as it was asked for.
@@ -163,6 +161,7 @@ class _Path:
 
     def __init__(self, machine: Machine) -> None:
         self._machine, self.times, self.pieces = machine, [0.0], []
+        self._stepper = Stepper(machine)
 
     def advance(self, y: Array, until: float, nearby: Nearby) -> tuple[Array, tuple[float, int] | None]:
         """Go on to a time [s] or the first touch; returns the state, and time and number of the pair that touches.
@@ -170,28 +169,21 @@ class _Path:
         Raises:
             RequestError: the integration breaks off.
         """
-        from scipy.integrate import DOP853  # whose import takes a tenth of a second
-
-        machine, count = self._machine, self._machine.nq + self._machine.nv
-        tolerance: Any = np.full(count + 2, SMALLEST * TOLERANCE)
-        tolerance[count:] = np.inf  # works are watched by the balance, not by the step
-        solver = DOP853(machine.rates, self.times[-1], y, until, rtol=TOLERANCE, atol=tolerance)
-        while solver.status == "running":
-            pace = machine.pace(solver.y[machine.nq : count])
-            solver.max_step = MAX_TURN_PER_STEP / pace if pace > 0.0 else math.inf
-            message = solver.step()
-            if solver.status == "failed" or not np.isfinite(solver.y).all():
+        machine, count, stepper = self._machine, self._machine.nq + self._machine.nv, self._stepper
+        stepper.begin(self.times[-1], y, until)
+        while stepper.running:
+            if (message := stepper.step()) is not None:
                 rates = tuple(float(v) for v in y[machine.nq : count])
-                raise bad_value("Robot.qvel", rates, f"the swing broke off at t = {solver.t:g} s: {message}")
-            piece = solver.dense_output()
+                raise bad_value("Robot.qvel", rates, f"the swing broke off at t = {stepper.t:g} s: {message}")
+            piece = stepper.piece()
             flow = lambda s, piece=piece: _flow(machine, piece(s))  # noqa: E731
-            touch = nearby.advance(flow, solver.t, solver.y)
+            touch = nearby.advance(flow, stepper.t, stepper.y)
             if touch is None or touch[0] > self.times[-1]:
                 self.pieces.append(piece)
-                self.times.append(solver.t if touch is None else touch[0])
+                self.times.append(stepper.t if touch is None else touch[0])
             if touch is not None:
-                return piece(touch[0]), touch
-        return solver.y, None
+                return stepper.state(touch[0]), touch
+        return stepper.y, None
 
 
 def _touch(machine: Machine, pair: Pair, t: float, y: Array) -> Touch:

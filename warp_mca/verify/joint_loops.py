@@ -152,6 +152,45 @@ def shafts(setup: Setup) -> tuple[float, float]:
     return float(np.abs(result["joint_O_q1_rad"] - known).max()), bend
 
 
+@case(
+    group="rigid",
+    title="Two geared wheels, one with a spring and a rotor, swing as one; a pinion rolls with its carriage on a rack",
+    reference="cos(w t), w^2 = r^2 k / (J_1 + r^2 (J_2 + A)); F t^2 / (2 m + J / R^2) / 2.",
+    elements=(),
+)
+def gears(setup: Setup) -> list[Row]:
+    """Wheels of 0.25 kg m^2 at a ratio of -2.5, for a second; a force of 40 N on a carriage of 1 kg, likewise."""
+    ratio, k, A, far = -2.5, 40.0, 0.1, (1.0, 0.3, -0.2)
+    felt = J + ratio**2 * (J + A)
+    rate = math.sqrt(ratio**2 * k / felt)
+    free, geared = mca.Freedom(), mca.Coupler(joint="A", ratio=ratio)
+    sprung = mca.Freedom(stiffness=k, rest=-ratio, armature=A, follows=geared)
+    hinges = (
+        mca.Articulation(name="A", body="a", freedoms=(free,)),
+        mca.Articulation(name="B", body="b", freedoms=(sprung,)),
+    )
+    samples, off = setup.choose((4000, 8000), (4000, 8000, 16000)), []
+    for steps in samples:
+        result = setup.run(machine((link("a", **ROTOR), link("b", far, **ROTOR)), hinges, steps))
+        known = -1.0 + np.cos(rate * result.time)
+        off.append(float(np.abs(result["joint_A_q1_rad"] - known).max()))
+    radius, force = 0.1, 40.0
+    push = mca.Freedom(kind="slide", axis=(1.0, 0.0, 0.0), motor=mca.Amplitude(times=(0.0,), values=(force,)))
+    roll = mca.Freedom(follows=mca.Coupler(joint="A", ratio=-1.0 / radius))
+    rack = (
+        mca.Articulation(name="A", body="a", freedoms=(push,)),
+        mca.Articulation(name="B", body="b", other="a", freedoms=(roll,)),
+    )
+    rolled = setup.run(machine((link("a", **ROTOR), link("b", **ROTOR)), rack, 1000))
+    way = 0.5 * force / (2.0 + J / radius**2)
+    return [
+        Row("greatest difference of a wheel's angle", 0.0, off, "rad", 1e-5, SECOND,
+            tuple(1.0 / steps for steps in samples), 1.0, 1.8),
+        Row("carriage's way", way, (float(rolled["joint_A_q1_m"][-1]),), "m", 1e-5, SECOND),
+        Row("pinion's angle", -way / radius, (float(rolled["joint_B_q1_rad"][-1]),), "rad", 1e-5, SECOND),
+    ]  # fmt: skip
+
+
 def rotor(setup: Setup, steps: int, speed: float, **freedom: Any) -> mca.Result:
     """A rotor of 0.25 kg m^2 on a hinge about z."""
     body = link("r", angular_velocity=(0.0, 0.0, speed), **ROTOR)
