@@ -187,7 +187,7 @@ def spring_function(friction: bool, laws: Laws) -> Any:
         owed, spent = wp.float64(0.0), wp.float64(0.0)
         if wp.static(laws.returns):
             F, W = law_force(-gap, k_old, spring.parameters, s), law_energy(-gap, k_old, spring.parameters, s)
-            c, owed, spent = pay(s, F, W, force_old - tangential, du, normal, spring)
+            c, owed, spent = pay(s, F, W, k_old, force_old, tangential, du, normal, spring)
             Fn += c
         if wp.static(damped):
             Fn, dissipated = damp(s, Fn, -gap, normal, du, k, force_old - tangential, dt, spring)

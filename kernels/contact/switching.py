@@ -15,8 +15,8 @@ import warp as wp
 from warp_mca.kernels.contact.balance import energy_made
 from warp_mca.kernels.contact.friction import release
 
-SHARE = 0.25  # greatest force that returns energy, over the force of a pressed spring
-PULL = 0.25  # the same over k times the motion of a step
+SHARE = 0.05  # greatest force that returns energy, over the force of a pressed spring
+PULL = 0.1  # the same over k times the motion of a step
 IDLE = 1e-3  # debt that rests, over the energy of a pressed spring
 LEAST = 1e-6  # debt that counts as returned once a spring is open, over k times the square of that motion
 
@@ -42,7 +42,9 @@ def pay(
     s: int,
     F: wp.float64,
     W: wp.float64,
+    k: wp.float64,
     before: wp.vec3d,
+    along: wp.vec3d,
     du: wp.vec3d,
     normal: wp.vec3d,
     spring: Any,
@@ -50,7 +52,8 @@ def pay(
     """What spring s, which holds W and presses with F, adds to its force [N]; sets what it owes then.
 
     Args:
-        before: its normal force on the node in the last step [N].
+        k: its stiffness [N/m].
+        before, along: its force on the node in the last step, and the part of friction [N].
         du: motion of the node relative to the face since then [m].
 
     Returns:
@@ -69,7 +72,9 @@ def pay(
             if spring.held[s] < wp.float64(ANY_DEPTH):  # in the first step bodies may overlap
                 lost = now
             now = zero
-        left = spring.normal_energy[s] + owed[0] - half * wp.dot(before, du) + now
+        left = spring.normal_energy[s] + owed[0] - half * wp.dot(before - along, du) + now
+        turned = wp.dot(along, normal)  # the part that friction loses where the normal has turned
+        left += half * turned * (turned / k - out)
         if wp.abs(left) > wp.float64(wp.static(IDLE)) * W and out != zero:
             c = returning(left, out, owed[2] * F)
             left -= half * c * out
