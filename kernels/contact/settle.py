@@ -10,7 +10,7 @@ from warp_mca.kernels.contact.nearest import Master, Nearest, edge_of, is_outsid
 from warp_mca.kernels.contact.projection import area_vector, weights_at
 from warp_mca.kernels.contact.search import TOO_DEEP, TURNED
 from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring, release_function, rest_function, spring_function
-from warp_mca.kernels.contact.switching import GONE, face_left
+from warp_mca.kernels.contact.switching import GONE, face_left, returns_energy
 from warp_mca.kernels.records.extremes import add_normal_force
 
 _SHARP = 0.7  # a node has turned a sharp edge if successive normals have a smaller cosine
@@ -123,7 +123,10 @@ def settle_functions(friction: bool, laws: Laws) -> tuple[Any, Any]:
         k_old = wp.where(is_open, wp.min(touch.own, touch.limit), spring.stiffness[s])
         stiffness = wp.where(touch.touches, wp.min(k_old, touch.limit), k_old)
         force, F_n = wp.vec3d(), wp.float64(0.0)
-        if touch.touches or wp.static(not laws.returns):  # else `leave` has released it
+        returns = bool(False)
+        if wp.static(laws.returns):
+            returns = returns_energy(s, spring)
+        if touch.touches or not returns:  # else `leave` has released it
             force, F_n = press(s, gap_pressed, normal_kept, touch.du, k_old, stiffness, mu, touch.dt, spring)
             spring.face[s] = wp.where(touch.touches, near.face, GONE)
             spring.weight[s] = touch.weight
@@ -175,7 +178,7 @@ def settle_functions(friction: bool, laws: Laws) -> tuple[Any, Any]:
         """Force [N] of a spring that returns what it owes on the node that no longer touches, before `settle`."""
         force = wp.vec3d()
         if wp.static(laws.returns):
-            if not touch.touches and spring.face[s] != GONE:
+            if not touch.touches and spring.face[s] != GONE and returns_energy(s, spring):
                 force = release(s, i, X, u, v, master, touch.dt, spring)
         return force
 

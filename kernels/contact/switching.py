@@ -31,6 +31,12 @@ def face_left(face: int) -> int:
 
 
 @wp.func
+def returns_energy(s: int, spring: Any) -> bool:
+    """Whether spring s does; in a batch those of some scenes may not."""
+    return spring.owed[s][2] > wp.float64(0.0)
+
+
+@wp.func
 def returning(owed: wp.float64, out: wp.float64, most: wp.float64) -> wp.float64:
     """Force [N], no more than `most`, that returns the energy `owed` [J] where a step moves the node by `out` [m]."""
     size = wp.min(most, wp.abs(owed / out))
@@ -133,11 +139,12 @@ def parting_function(friction: bool, open_contact: Any) -> Any:
             spring.face[s] = -2 - face_left(face)
         else:
             open_contact(s, du, k, spring)
-            lost = wp.max(left, zero)  # what it holds as it is let go
-            spring.lost[s] = spring.lost[s] + lost
-            spring.made[s] = spring.made[s] + lost
-            spring.normal_energy[s] = zero
-            spring.owed[s] = wp.vec3d(zero, zero, owed[2])
+            if owed[2] > zero:
+                lost = wp.max(left, zero)  # what it holds as it is let go
+                spring.lost[s] = spring.lost[s] + lost
+                spring.made[s] = spring.made[s] + lost
+                spring.normal_energy[s] = zero
+                spring.owed[s] = wp.vec3d(zero, zero, owed[2])
         return force
 
     return part
