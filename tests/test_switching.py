@@ -7,6 +7,7 @@ import pytest
 from impacts import begun, finished, momentum
 
 import warp_mca as mca
+from benchmarks.random_scenes.default import default
 
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
 SPAN = 2e-5
@@ -65,3 +66,11 @@ def test_bodies_keep_energy_and_momentum(cells):
     result = mca.run(scene)
     assert result.summary["energy_error"] < 1e-3
     assert result.summary["energy"]["contact_loss"] >= -1e-9
+
+
+def test_a_node_that_slides_off_loses_what_its_spring_holds():
+    """Bars that strike aslant: such losses were 0.3 % of the energy that the ledger did not explain."""
+    result = mca.run(default(17).scene)
+    energy = result.summary["energy"]
+    assert result.summary["energy_error"] < 1e-3
+    assert 2e-3 * energy["initial"] < energy["contact_loss"] < 2e-2 * energy["initial"]
