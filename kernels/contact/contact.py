@@ -11,7 +11,8 @@ from warp_mca.kernels.contact.nearest import Master, nearest_face
 from warp_mca.kernels.contact.pairs import Pairs, pair_factor
 from warp_mca.kernels.contact.search import STALE, TOO_DEEP, moved_too_far
 from warp_mca.kernels.contact.settle import meet_side, settle_functions
-from warp_mca.kernels.contact.spring import Spring, open_function, pressure_function, rest_function, spring_function
+from warp_mca.kernels.contact.spring import Spring, pressure_function, release_function, rest_function, spring_function
+from warp_mca.kernels.contact.switching import GONE, face_left
 from warp_mca.kernels.contact.way_back import recent
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.per_scene import kind, value_function
@@ -36,7 +37,7 @@ def surface_kernel(friction: bool, each: bool, laws: Laws = PLAIN, noted: bool =
     `noted`: keep the recent force on each node, which masters with several sides need. `general`: springs have the
     factors of `Pairs`.
     """
-    settle, let_go = settle_functions(friction, laws)
+    settle, let_go, leave = settle_functions(friction, laws)
     pressure = pressure_function(friction)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
     Table = Pairs if general else wp.int32
@@ -87,12 +88,15 @@ def surface_kernel(friction: bool, each: bool, laws: Laws = PLAIN, noted: bool =
                 factor = pair_factor(pairs, s, near.face)
                 touch.own *= factor
                 touch.limit *= factor
-            force = settle(s, k, near, touch, of(mu, k), of(per_newton, k), spring, normal_force_out, flag_out)
+            force = leave(s, i, X, u, v, master, touch, spring)
+            force += settle(s, k, near, touch, of(mu, k), of(per_newton, k), spring, normal_force_out, flag_out)
             nodal_force_out[i] = nodal_force_out[i] + force
             if wp.static(noted):
                 recent_out[i] = recent(recent_out[i], force)
         elif not bonded:
-            let_go(s, i, v, master.face, dt, near.front, held, spring)
+            force = let_go(s, i, X, u, v, master, dt, near.front, held, spring)
+            if wp.static(laws.returns):
+                nodal_force_out[i] = nodal_force_out[i] + force
         if moved_too_far(u[i], u_search[i], of(margin, k)):
             flag_out[k, STALE] = 1
 
@@ -142,7 +146,7 @@ def react_kernel(each: bool, lanes: int, noted: bool = False) -> Any:
                 s = face_slave[f, q]
                 w = spring.weight[s]  # read before it is known whether they count, to hide the latency of memory
                 force = spring.force[s]
-                if spring.face[s] == f:
+                if face_left(spring.face[s]) == f:
                     touched = wp.float64(1.0)
                     for c in range(4):
                         if corners[c] == i:
@@ -176,7 +180,7 @@ def plane_kernel(
     stiffer while it is pressed would make energy.
     """
     press = spring_function(friction, laws)
-    open_contact = open_function(friction, laws)
+    let_open = release_function(friction, laws)
     gap_from_rest = rest_function(laws.pressed)
     of, Real, Vector, Index = value_function(each), kind(wp.float64, each), kind(wp.vec3d, each), kind(wp.int32, each)
 
@@ -226,8 +230,8 @@ def plane_kernel(
             add_normal_force(k, F_n, of(per_newton, k), normal_force_out)
             spring.face[s] = 0
             nodal_force_out[i] = nodal_force_out[i] + force
-        elif spring.face[s] >= 0:
-            open_contact(s, du, own, spring)
+        elif spring.face[s] != GONE:
+            nodal_force_out[i] = nodal_force_out[i] + let_open(s, du, normal, own, True, spring)
         if wp.static(friction):  # work of the plane's own motion, trapezoidal as for slip
             half = wp.float64(0.5)
             spring.drive[s] = spring.drive[s] + half * dt * wp.dot(before + spring.tangential[s], velocity)

@@ -203,7 +203,7 @@ def release_function(friction: bool, sides: int, laws: Laws) -> Any:
 
     It gives the force on the node [N]. `newcomer` is the spring that begins to press the node in this step, or -1.
     """
-    settle, let_go = settle_functions(friction, laws)
+    settle, let_go, leave = settle_functions(friction, laws)
     pressure, find_support = pressure_function(friction), support_function(sides)
     Gaps, Faces = wp.types.vector(sides, wp.float64), wp.types.vector(sides, wp.int32)
 
@@ -229,19 +229,20 @@ def release_function(friction: bool, sides: int, laws: Laws) -> Any:
         recent_force: wp.array(dtype=wp.vec3d),
         flag_out: wp.array2d(dtype=wp.int32),
     ) -> wp.vec3d:
-        support = no_support()
+        support, i = no_support(), at.slaves.node[s]
         if node.listed > 1 and (newcomer < 0 or newcomer == e) and not hovers(at, near):
             support = find_support(at, s, e, node, front_gap, front_face, along, spring)
         if support.edge < 0:
-            let_go(e, at.slaves.node[s], v, at.master.face, dt, near.front, spring.held[e], spring)
+            force = let_go(e, i, at.X, at.u, v, at.master, dt, near.front, spring.held[e], spring)
             note_way(e, bool(False), ends, spring)
-            return wp.vec3d()
+            return force
         touch = meet_edge(v, at, s, e, support, dt, wp.vec3f(pressure(e, spring)), spring, recent_force)
+        left = leave(e, i, at.X, at.u, v, at.master, touch, spring)
         force = settle(e, scene, support.near, touch, mu, per_newton, spring, normal_force_out, flag_out)
         note_way(e, touch.touches, ends, spring)
         if touch.touches:
             spring.support[e] = support.edge
         spring.share[e] = support.share
-        return support.share * force
+        return left + support.share * force
 
     return release

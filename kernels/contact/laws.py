@@ -24,12 +24,14 @@ class Laws(NamedTuple):
         friction: of the laws of friction, in the order in which they change its limit; none for Coulomb's alone.
         bond: whether some slave nodes are glued, see `kernels.contact.bond`.
         pressed: whether bodies that overlap at the start are pressed apart, see `kernels.contact.spring.shrink`.
+        returns: whether springs return the energy of closing and opening, see `kernels.contact.switching`.
     """
 
     normal: str = LINEAR
     friction: tuple[str, ...] = ()
     bond: bool = False
     pressed: bool = False
+    returns: bool = False
 
 
 PLAIN = Laws()

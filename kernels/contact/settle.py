@@ -7,9 +7,10 @@ import warp as wp
 
 from warp_mca.kernels.contact.laws import Laws
 from warp_mca.kernels.contact.nearest import Master, Nearest, edge_of, is_outside, master_velocity, passes_by, reachable
-from warp_mca.kernels.contact.projection import weights_at
+from warp_mca.kernels.contact.projection import area_vector, weights_at
 from warp_mca.kernels.contact.search import TOO_DEEP, TURNED
-from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring, open_function, rest_function, spring_function
+from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring, release_function, rest_function, spring_function
+from warp_mca.kernels.contact.switching import GONE, face_left, returns_energy
 from warp_mca.kernels.records.extremes import add_normal_force
 
 _SHARP = 0.7  # a node has turned a sharp edge if successive normals have a smaller cosine
@@ -95,7 +96,7 @@ def meet_side(
 def settle_functions(friction: bool, laws: Laws) -> tuple[Any, Any]:
     """The functions (settle: press a node on the face that it touches; let_go: release a node that found no face)."""
     press = spring_function(friction, laws)
-    open_contact = open_function(friction, laws)
+    let_open = release_function(friction, laws)
     gap_from_rest = rest_function(laws.pressed)
 
     @wp.func
@@ -121,12 +122,17 @@ def settle_functions(friction: bool, laws: Laws) -> tuple[Any, Any]:
         gap_pressed, rest = gap_from_rest(s, gap_kept, rest, spring)
         k_old = wp.where(is_open, wp.min(touch.own, touch.limit), spring.stiffness[s])
         stiffness = wp.where(touch.touches, wp.min(k_old, touch.limit), k_old)
-        force, F_n = press(s, gap_pressed, normal_kept, touch.du, k_old, stiffness, mu, touch.dt, spring)
+        force, F_n = wp.vec3d(), wp.float64(0.0)
+        returns = bool(False)
+        if wp.static(laws.returns):
+            returns = returns_energy(s, spring)
+        if touch.touches or not returns:  # else `leave` has released it
+            force, F_n = press(s, gap_pressed, normal_kept, touch.du, k_old, stiffness, mu, touch.dt, spring)
+            spring.face[s] = wp.where(touch.touches, near.face, GONE)
+            spring.weight[s] = touch.weight
         spring.rest[s] = rest
         spring.stiffness[s] = stiffness
         add_normal_force(scene, F_n, per_newton, normal_force_out)
-        spring.face[s] = wp.where(touch.touches, near.face, -1)
-        spring.weight[s] = touch.weight
         spring.held[s] = wp.where(touch.touches or near.front < wp.float64(FAR), -gap_kept, touch.held)
         if gap_pressed * gap_pressed > near.area:
             flag_out[scene, TOO_DEEP] = 1
@@ -137,22 +143,65 @@ def settle_functions(friction: bool, laws: Laws) -> tuple[Any, Any]:
         return force
 
     @wp.func
+    def release(
+        s: int,
+        i: int,
+        X: wp.array(dtype=wp.vec3d),
+        u: wp.array(dtype=wp.vec3d),
+        v: wp.array(dtype=wp.vec3d),
+        master: Master,
+        dt: wp.float64,
+        spring: Spring,
+    ):
+        f = face_left(spring.face[s])
+        du = dt * (v[i] - master_velocity(v, master.face, f, spring.weight[s]))
+        normal, listed = wp.vec3d(), bool(False)
+        if wp.static(laws.returns):
+            normal = wp.normalize(area_vector(X, u, master.face, f))
+            for c in range(master.count[s]):  # the face gathers its reaction only then
+                listed = listed or master.candidate[s, c] == f
+            if spring.support.shape[0] > 0:
+                listed = listed and spring.support[s] < 0
+        return let_open(s, du, normal, spring.stiffness[s], listed, spring)
+
+    @wp.func
+    def leave(
+        s: int,
+        i: int,
+        X: wp.array(dtype=wp.vec3d),
+        u: wp.array(dtype=wp.vec3d),
+        v: wp.array(dtype=wp.vec3d),
+        master: Master,
+        touch: Touch,
+        spring: Spring,
+    ):
+        """Force [N] of a spring that returns what it owes on the node that no longer touches, before `settle`."""
+        force = wp.vec3d()
+        if wp.static(laws.returns):
+            if not touch.touches and spring.face[s] != GONE and returns_energy(s, spring):
+                force = release(s, i, X, u, v, master, touch.dt, spring)
+        return force
+
+    @wp.func
     def let_go(
         s: int,
         i: int,
+        X: wp.array(dtype=wp.vec3d),
+        u: wp.array(dtype=wp.vec3d),
         v: wp.array(dtype=wp.vec3d),
-        face: wp.array2d(dtype=wp.int32),
+        master: Master,
         dt: wp.float64,
         front: wp.float64,
         held: wp.float64,
         spring: Spring,
     ):
-        if spring.face[s] >= 0:
-            du = dt * (v[i] - master_velocity(v, face, spring.face[s], spring.weight[s]))
-            open_contact(s, du, spring.stiffness[s], spring)
+        force = wp.vec3d()
+        if spring.face[s] != GONE:
+            force = release(s, i, X, u, v, master, dt, spring)
             _gap, rest = gap_from_rest(s, wp.float64(0.0), spring.rest[s], spring)
             spring.rest[s] = rest
         if held == wp.float64(ANY_DEPTH) or (held > wp.float64(0.0) and front < wp.float64(FAR)):
             spring.held[s] = wp.float64(0.0)
+        return force
 
-    return settle, let_go
+    return settle, let_go, leave

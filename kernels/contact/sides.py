@@ -38,7 +38,7 @@ def sided_kernel(friction: bool, each: bool, sides: int, laws: Laws = PLAIN, slo
     the side that released it, because it may have slid over an edge. If several sides have candidates, step 0 chooses
     among them; step 1 presses the node. Each of the `slots` bodies that a node may touch at once has its own springs.
     """
-    settle, _ = settle_functions(friction, laws)
+    settle, _, leave = settle_functions(friction, laws)
     choose, confirm = choice_functions(friction, sides)
     pressure, springs_of_node = pressure_function(friction), springs_function(friction, sides)
     front_faces, may_press = front_functions(sides)
@@ -66,8 +66,7 @@ def sided_kernel(friction: bool, each: bool, sides: int, laws: Laws = PLAIN, slo
         let_next_begin()
         s = first + wp.tid()
         i, k = at.slaves.node[s], of(scene, s)
-        x = at.X[i] + at.u[i]
-        total, scale, active = wp.vec3d(), of(per_newton, k), bool(False)
+        x, total, scale, active = at.X[i] + at.u[i], wp.vec3d(), of(per_newton, k), bool(False)
         start, end = wp.static(sides * slots) * s, wp.static(sides * slots) * (s + 1)
         if wp.static(laws.bond):
             start, total = hold_node(at, s, k, start, end, v, scale, dt, spring, normal_force_out)
@@ -94,6 +93,7 @@ def sided_kernel(friction: bool, each: bool, sides: int, laws: Laws = PLAIN, slo
                             touch = confirm(at, e, near, touch, touches, node, choice, spring)
                             touch.own = greatest_stiffness(at, s, near.face)
                             touch.limit = touch.own
+                            total += leave(e, i, at.X, at.u, v, at.master, touch, spring)
                             total += settle(e, k, near, touch, of(mu, k), scale, spring, normal_force_out, flag_out)
                             note_way(e, touch.touches, ends, spring)
                     elif step == 1:

@@ -10,17 +10,18 @@ from warp_mca.kernels.contact.dashpot import dashpot_function
 from warp_mca.kernels.contact.friction import release, stick_slip
 from warp_mca.kernels.contact.friction_laws import limit_function
 from warp_mca.kernels.contact.laws import PLAIN, Laws, law_functions
+from warp_mca.kernels.contact.switching import ANY_DEPTH, GONE, parting_function, pay
 
-FAR = 1e30  # larger than any distance [m]
-ANY_DEPTH = FAR  # depth before the first step: bodies may overlap from the start
+FAR = ANY_DEPTH  # larger than any distance [m]
 
 
 @wp.struct
 class Spring:
     """State of every slave node's springs; arrays have shape (spring_count,), those of slave 0 first.
 
-    tangential: friction force on the slave [N]. force: total force on it [N]. face: touched face or -1 [-]. weight:
-    shape functions of the touched point [-]. energy: elastic energy held [J]. friction: energy dissipated so far [J].
+    tangential: friction force on the slave [N]. force: total force on it [N]. face: touched face or -1; -2 - f where
+    the spring has left face f and still returns energy, see `kernels.contact.switching` [-]. weight: shape functions of
+    the touched point [-]. energy: elastic energy held, and owed [J]. friction: energy dissipated so far [J].
     drive: work done by a moving plane, or by pressing bodies apart, so far [J]. impulse, normal_impulse, stick_impulse:
     force, normal force and normal force while sticking, summed over the steps since the last row of the history [N].
     depth: largest penetration so far [m]. held: depth in the touched face, or in the last one for a node that slid off
@@ -39,7 +40,9 @@ class Spring:
     of the laws of friction [SI units], shape (law_count spring_count, parameter_count), those of spring 0 first; only
     of contacts with such laws. bond: 1 while a bond holds the node to its place on `face`, -1 once it has failed, else
     0 [-]. bond_time: how long it has held [s]. bond_limit: forces in tension and in shear at which it fails [N]. These
-    three are only of contacts with bonds.
+    three are only of contacts with bonds. owed: energy that closing and opening took and that is not returned yet [J],
+    force that returns it [N], and the greatest share of the spring's force that it may be, 0 for none [-]; only of
+    contacts that return energy.
     """
 
     tangential: wp.array(dtype=wp.vec3d)
@@ -68,6 +71,7 @@ class Spring:
     limit: wp.array(dtype=wp.float64)
     friction_parameters: wp.array2d(dtype=wp.float64)
     pressed: wp.array(dtype=wp.vec2d)
+    owed: wp.array(dtype=wp.vec3d)
     bond: wp.array(dtype=wp.int32)
     bond_time: wp.array(dtype=wp.float64)
     bond_limit: wp.array(dtype=wp.vec2d)
@@ -82,7 +86,7 @@ def pressure_function(friction: bool) -> Any:
         force = spring.force[e]
         if wp.static(friction):
             force -= spring.tangential[e]
-        return force
+        return wp.where(spring.face[e] < GONE, wp.vec3d(), force)
 
     return pressure
 
@@ -174,25 +178,26 @@ def spring_function(friction: bool, laws: Laws) -> Any:
     ):
         """Force of a spring whose stiffness was k_old and is k [N/m], no more than that; the normal force."""
         # read everything before writing anything, so that a GPU waits for memory once
-        impulse = spring.impulse[s]
-        normal_impulse = spring.normal_impulse[s]
-        depth = spring.depth[s]
-        made_before = spring.made[s]
-        force_old = spring.force[s]
-        energy_old = spring.energy[s]
+        impulse, normal_impulse, depth = spring.impulse[s], spring.normal_impulse[s], spring.depth[s]
+        made_before, force_old, energy_old = spring.made[s], spring.force[s], spring.energy[s]
         tangential, friction_work, stick_impulse = friction_before(s, spring)
         half = wp.float64(0.5)
         Fn = law_force(-gap, k, spring.parameters, s)
         stored = law_energy(-gap, k, spring.parameters, s)
-        spent = wp.float64(0.0)
+        owed, spent = wp.float64(0.0), wp.float64(0.0)
+        if wp.static(laws.returns):
+            F, W = law_force(-gap, k_old, spring.parameters, s), law_energy(-gap, k_old, spring.parameters, s)
+            c, owed, spent = pay(s, F, W, k_old, force_old, tangential, du, normal, spring)
+            Fn += c
         if wp.static(damped):
-            Fn, spent = damp(s, Fn, -gap, normal, du, k, force_old - tangential, dt, spring)
+            Fn, dissipated = damp(s, Fn, -gap, normal, du, k, force_old - tangential, dt, spring)
+            spent += dissipated
         share = wp.float64(1.0)
         if k < k_old:
             share, lost = soften(s, gap, normal, du, k_old, k, spring)
             spent += lost
         force = Fn * normal
-        energy = stored
+        energy = stored + owed
         if wp.static(friction):
             limit = mu * Fn
             if wp.static(by_laws):
@@ -248,3 +253,21 @@ def open_function(friction: bool, laws: Laws = PLAIN) -> Any:
         spring.face[s] = -1
 
     return open_contact
+
+
+@cache
+def release_function(friction: bool, laws: Laws) -> Any:
+    """The function that opens a spring, at once or in steps that return what it owes; its force on the node [N]."""
+    open_contact = open_function(friction, laws)
+    part = parting_function(friction, open_contact)
+
+    @wp.func
+    def let_open(s: int, du: wp.vec3d, normal: wp.vec3d, k: wp.float64, may_stay: bool, spring: Spring):
+        force = wp.vec3d()
+        if wp.static(laws.returns):
+            force = part(s, du, normal, k, may_stay, spring)
+        else:
+            open_contact(s, du, k, spring)
+        return force
+
+    return let_open

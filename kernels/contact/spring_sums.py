@@ -47,7 +47,7 @@ def sum_springs(
     for s in range(begin + lane, end, wp.block_dim()):
         held = spring.energy[s]
         sums[wp.static(SPRING_ENERGY)] += held
-        if held > wp.float64(0.0):
+        if spring.face[s] >= 0:
             Ft = spring.tangential[s]
             Fn = spring.force[s] - Ft
             square = wp.dot(Fn, Fn)

@@ -82,7 +82,7 @@ def nearest_of_lanes(
 @cache
 def contact_role(friction: bool, laws: Laws) -> Any:
     """The function that gives slave nodes their contact forces in each of the kernel's steps."""
-    settle, let_go = settle_functions(friction, laws)
+    settle, let_go, leave = settle_functions(friction, laws)
     pressure = pressure_function(friction)
 
     @wp.func
@@ -104,11 +104,14 @@ def contact_role(friction: bool, laws: Laws) -> Any:
         """Press a node or release it, as `contact.surface_kernel` does."""
         if near.face >= 0:
             touch = meet_side(X, state_out.u, state_out.v, master, i, near, slaves.stiffness[s], dt, held, along)
-            state_out.nodal_force[i] = state_out.nodal_force[i] + settle(
-                s, 0, near, touch, slaves.mu, slaves.per_newton, spring, normal_force_out, flag_out
+            left = leave(s, i, X, state_out.u, state_out.v, master, touch, spring)
+            state_out.nodal_force[i] = state_out.nodal_force[i] + (
+                left + settle(s, 0, near, touch, slaves.mu, slaves.per_newton, spring, normal_force_out, flag_out)
             )
         else:
-            let_go(s, i, state_out.v, master.face, dt, near.front, held, spring)
+            left = let_go(s, i, X, state_out.u, state_out.v, master, dt, near.front, held, spring)
+            if wp.static(laws.returns):
+                state_out.nodal_force[i] = state_out.nodal_force[i] + left
 
     @wp.func
     def touch_slaves(

@@ -8,6 +8,7 @@ import warp as wp
 from warp_mca.kernels.contact.contact import LANES
 from warp_mca.kernels.contact.search import STALE, moved_too_far
 from warp_mca.kernels.contact.spring import Spring
+from warp_mca.kernels.contact.switching import face_left
 from warp_mca.kernels.elements.patch_layout import PATCH
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.shared_memory import shared_functions
@@ -56,7 +57,7 @@ def corners_of_node(f: int, i: int, faces: Faces):
 @wp.func
 def less_reaction(total: wp.vec3d, mine: wp.vec4d, pressed: int, f: int, w: wp.vec4d, force: wp.vec3d):
     """Subtract the node's share of the force of a spring that presses face f from the force on the node."""
-    if pressed == f:
+    if face_left(pressed) == f:
         for c in range(4):
             if mine[c] > wp.float64(0.0):
                 total -= w[c] * force

@@ -40,6 +40,7 @@ GOES = (
         "left",
         "bears",
         "limit",
+        "owed",
     ),
     *("dashpot", "pressed"),
 )

@@ -104,6 +104,7 @@ class ContactPass:
         room: slave nodes that the list of a face holds.
         deepest: penetration of a plane that stops the run [m]; faces have half their own size.
         initial_overlap, internal: as in `Contact`.
+        returns: whether its springs return the energy of closing and opening, see `kernels.contact.switching`.
         pairs: bodies of a general contact, or None.
         bonds: that glue its slave nodes, or None.
     """
@@ -137,6 +138,7 @@ class ContactPass:
     deepest: float = field(default=0.0, metadata=AS_IS)
     initial_overlap: str = field(default="refuse", metadata=AS_IS)
     internal: bool = field(default=False, metadata=AS_IS)
+    returns: bool = field(default=False, metadata=AS_IS)
     pairs: Pairs | None = field(default=None, metadata=AS_IS)
     bonds: BondedNodes | None = field(default=None, metadata=AS_IS)
 

@@ -8,7 +8,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warp_mca.kernels.contact import contact, edge_shares, edges, spring
+from warp_mca.kernels.contact import contact, edge_shares, edges, spring, switching
 from warp_mca.kernels.contact.laws import law_functions
 from warp_mca.physics.contact.bonds import glue
 from warp_mca.system.threads import CONTACT, Split
@@ -36,6 +36,7 @@ def new_springs(count: int, sided: int, stage: ContactStage) -> Any:
     found.limit = wp.zeros(count if stage.laws.friction else 0, dtype=wp.float64)
     found.rest = wp.zeros(count if stage.may_rest else sided, dtype=wp.float64)
     found.pressed = wp.zeros(count if stage.laws.pressed else 0, dtype=wp.vec2d)
+    found.owed = wp.array(_shares(stage), dtype=wp.vec3d)
     found.left = wp.zeros(sided, dtype=wp.float64)
     found.share = wp.full(sided, 1.0, dtype=wp.float64)
     found.support = wp.full(sided, -1, dtype=wp.int32)
@@ -45,6 +46,13 @@ def new_springs(count: int, sided: int, stage: ContactStage) -> Any:
     found.weight = wp.zeros(count, dtype=wp.vec4d)
     glue(found, stage)
     return found
+
+
+def _shares(stage: ContactStage) -> NDArray[np.float64]:
+    """`Spring.owed` at the start, shape (spring_count, 3), or (0, 3) where no spring returns energy."""
+    rows = [(0.0, 0.0, switching.SHARE if item.returns else 0.0) for item in stage.items]
+    found = np.repeat(rows, np.diff(stage.springs), axis=0)
+    return found if stage.laws.returns else found[:0]
 
 
 def faces_of_slaves(stage: ContactStage, face: NDArray[np.int32], rows: tuple[wp.array, wp.array]) -> Any:

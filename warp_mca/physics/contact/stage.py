@@ -86,7 +86,7 @@ class ContactStage:
         self.mu, self.overlaps = numbers([item.mu for item in items]), {item.initial_overlap for item in items}
         self.may_rest = items[0].plane is None or self.overlaps != {"refuse"} or model.fails
         bonded, pressed = any(item.bonds is not None for item in items), "press" in self.overlaps
-        self.laws = Laws(items[0].law, items[0].friction, bonded, pressed)
+        self.laws = Laws(items[0].law, items[0].friction, bonded, pressed, any(item.returns for item in items))
         check_dashpots(items)
         rows = np.repeat([item.parameters for item in items], np.diff(self.springs), axis=0)
         self.parameters = wp.array(rows, dtype=wp.float64, ndim=2)

@@ -86,6 +86,13 @@ def _faces_around(nodes: Index, face: Index) -> tuple[Index, Index]:
     return offset.astype(np.int32), (order // 4).astype(np.int32)
 
 
+def _returns(contact: Contact | ContactAll) -> bool:
+    """Whether springs return the energy of closing and opening: those whose stiffness is left to the program."""
+    plain = contact.law is None or not contact.law.damping(0.0)
+    held = isinstance(contact, Contact) and contact.bond is not None
+    return contact.penalty is None and plain and not held and contact.initial_overlap != "press"
+
+
 def surface_pass(
     contact: Contact | ContactAll, index: int, slave: Faces, master: Faces, own: Array, other: Array, sign: float
 ) -> ContactPass:
@@ -120,6 +127,7 @@ def surface_pass(
         room=_room(slave, master, margin),
         initial_overlap=contact.initial_overlap,
         internal=contact.internal,
+        returns=_returns(contact),
     )
 
 
@@ -152,6 +160,7 @@ def contact_passes(
                 curved=not is_flat(slave, None),
                 initial_overlap=contact.initial_overlap,
                 internal=contact.internal,
+                returns=_returns(contact),
             )
         ]
     passes = [surface_pass(contact, index, slave, master, own[0], other[0][1], 1.0)]
