@@ -15,12 +15,14 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
+import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.base.errors import GuardError, bad_value
 from warp_mca.phases.division import MAX_STEPS, coarser
 from warp_mca.phases.half_steps import HalfSteps
 from warp_mca.phases.stretch import Stretch, stretch_ended
+from warp_mca.physics.contact.slave_edges import return_energy
 from warp_mca.scene import Settle
 
 if TYPE_CHECKING:
@@ -50,6 +52,7 @@ def settle(phase: Settle, impact: Impact, tell: Callable[[float], None]) -> Stre
     speed = float(np.linalg.norm(impact.ready[0].scene.gravity)) * phase.duration
     steps = coarser(fine, model, joined, math.ceil(phase.duration / (joined * fine.interval)), speed)
     impact.take(steps)
+    _return_energy(impact, False)
     motion = HalfSteps(impact, phase.falling)
     motion.slow(0.0)
     motion.fall()
@@ -82,7 +85,15 @@ def settle(phase: Settle, impact: Impact, tell: Callable[[float], None]) -> Stre
     motion.rest(fine.per_interval - 1)
     stretch = stretch_ended(impact, "settle", "rest", fine)
     motion.release(impact.scene_runs[0])
+    _return_energy(impact, True)
     return stretch
+
+
+def _return_energy(impact: Impact, on: bool) -> None:
+    """Whether contact springs return what closing and opening took, which they tell by velocities."""
+    with wp.ScopedDevice(impact.solver.device):
+        for stage, own in zip(impact.solver.contacts, impact.state.contacts, strict=True):
+            return_energy(stage, own.spring, on)
 
 
 def _advance(impact: Impact, stride: int) -> None:

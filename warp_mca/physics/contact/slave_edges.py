@@ -48,6 +48,11 @@ def new_springs(count: int, sided: int, stage: ContactStage) -> Any:
     return found
 
 
+def return_energy(stage: ContactStage, springs: Any, on: bool) -> None:
+    """Let springs return energy from now on, or none while velocities change otherwise than by forces."""
+    springs.owed.assign(_shares(stage) if on else 0.0 * _shares(stage))
+
+
 def _shares(stage: ContactStage) -> NDArray[np.float64]:
     """`Spring.owed` at the start, shape (spring_count, 3), or (0, 3) where no spring returns energy."""
     rows = [(0.0, 0.0, switching.SHARE if item.returns else 0.0) for item in stage.items]
