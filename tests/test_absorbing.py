@@ -147,7 +147,7 @@ def test_boundaries_absorb_relative_to_the_motion_of_the_body(precision: str):
     drift = still.state.steps * still.solver.dt * np.array(DRIFT)
     np.testing.assert_allclose(way, np.broadcast_to(drift, way.shape), rtol=exact)
     errors = [item.scene_runs[0].ledger.kept.energy_error for item in (still, finished(drop(absorbing=())))]
-    assert errors[0] == pytest.approx(errors[1], rel=1e-3)  # contact alone misses some, with such coarse cells
+    assert max(errors) < 1e-5
 
 
 def test_a_body_that_moves_as_it_did_feels_nothing():

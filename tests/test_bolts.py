@@ -196,9 +196,9 @@ def test_its_preload_is_back_after_an_impact():
 def test_a_tightened_bolt_goes_on_from_a_saved_state(tmp_path: Path):
     """The lengths of its springs, which tightening sets, are part of the State."""
     impact = begun(clamped())
-    impact.solver.Bolt.tighten(True)
+    impact.solver.Bolt.settle(True)
     impact.advance(until=impact.steps.count // 2)
-    impact.solver.Bolt.tighten(False)
+    impact.solver.Bolt.settle(False)
     impact.save(tmp_path / "middle.state")
     impact.advance()
     later = begun(clamped())

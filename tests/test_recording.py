@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -328,8 +329,10 @@ def test_a_run_that_breaks_a_guard_leaves_all_frames_until_then(tmp_path):
 
     usd, vtkhdf, cadence = tmp_path / "a.usda", tmp_path / "a.vtkhdf", Cadence(seconds=1e-6)
     impact = mca.ImpactPhase(duration=1e-3, output_interval=1e-6, energy_tolerance=1e-4)
+    scene = bar(impact=impact)
+    scene = dataclasses.replace(scene, contacts=(dataclasses.replace(scene.contacts[0], penalty=1.0),))
     with pytest.raises(GuardError):
-        mca.run(bar(impact=impact), recorders=[UsdFile(usd, cadence=cadence), VtkHdfFile(vtkhdf, cadence=cadence)])
+        mca.run(scene, recorders=[UsdFile(usd, cadence=cadence), VtkHdfFile(vtkhdf, cadence=cadence)])
     with h5py.File(vtkhdf) as file:
         count = int(file["VTKHDF/Steps"].attrs["NSteps"])
     assert count % 5
@@ -451,7 +454,6 @@ def test_plastic_strain_at_nodes():
 
 
 def test_a_scene_without_paths_pays_nothing_for_them(monkeypatch: pytest.MonkeyPatch):
-    import dataclasses
 
     from warp_mca.step import output
 
