@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from warp_mca.base.errors import bad_value
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
 # Okabe and Ito's colours, told apart by colour-blind readers; line styles tell them apart in grey print.
 BLUE, VERMILION, BLACK = "#0072B2", "#D55E00", "#222222"
@@ -37,6 +38,7 @@ def new_figure(width: float, height: float, layout: str = "constrained") -> Figu
     """An empty figure of `width` by `height` [inch] that draws without a display; layout "none" for `place`."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
     figure = Figure(figsize=(width, height), layout=layout)  # pyright: ignore[reportArgumentType]
     FigureCanvasAgg(figure)
@@ -45,7 +47,7 @@ def new_figure(width: float, height: float, layout: str = "constrained") -> Figu
 
 def place(
     figure: Figure,
-    panels: Sequence[Axes],
+    panels: Sequence[Axes] | NDArray[Any],
     *,
     left: float = 0.9,
     right: float = 0.2,
@@ -59,7 +61,7 @@ def place(
 
     Args:
         figure: that has them.
-        panels: in one column, from the top.
+        panels: in one column, from the top, shape (panel_count,).
         left, right, top, bottom: room around them [inch].
         gap: between two [inch].
     """
