@@ -38,7 +38,6 @@ def new_figure(width: float, height: float, layout: str = "constrained") -> Figu
     """An empty figure of `width` by `height` [inch] that draws without a display; layout "none" for `place`."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
     figure = Figure(figsize=(width, height), layout=layout)  # pyright: ignore[reportArgumentType]
     FigureCanvasAgg(figure)
