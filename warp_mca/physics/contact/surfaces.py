@@ -87,7 +87,7 @@ def _faces_around(nodes: Index, face: Index) -> tuple[Index, Index]:
 
 
 def _returns(contact: Contact | ContactAll) -> bool:
-    """Whether springs return the energy of closing and opening: those whose stiffness is left to the program."""
+    """Whether springs return the energy of closing and opening: those without a penalty."""
     plain = contact.law is None or not contact.law.damping(0.0)
     held = isinstance(contact, Contact) and contact.bond is not None
     return contact.penalty is None and plain and not held and contact.initial_overlap != "press"
