@@ -151,6 +151,7 @@ class Relaxation:
         for own, kept in zip(self.trial.elements, self.base.elements, strict=True):
             wp.copy(own.yielded, kept.yielded)
             wp.copy(own.history, kept.history)
+            wp.copy(own.extreme, kept.extreme)  # else what internal vectors take adds up over a search
         for stage in self.solver.elements:
             stage.launch(self.solver.work, self.trial)
 
