@@ -98,7 +98,10 @@ def balance(result: mca.Result, film: Film, listed: bool) -> Row:
     found: Row = {"momentum": float(f"{np.linalg.norm(gained):.5g}")}
     if not listed:
         return found
-    impulse = (result.time[1] - result.time[0]) * result.contacts[0].force.sum(axis=0)
+    force = result.contacts[0].force
+    step = (result.time[-1] - result.time[0]) / result.summary["n_steps"]
+    # velocities of the last frame are those of half a step before
+    impulse = (result.time[1] - result.time[0]) * force.sum(axis=0) - 0.5 * step * force[-1]
     size = max(np.linalg.norm(gained), 1e-6 * max(np.linalg.norm(m) for m in film.momentum[0].values()))
     off = min(np.linalg.norm(gained - impulse), np.linalg.norm(gained + impulse)) / size
     return found | {"momentum_off": float(f"{off:.3g}")}
