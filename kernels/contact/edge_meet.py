@@ -17,6 +17,7 @@ from warp_mca.kernels.contact.edge_pairs import (
     share_an_end,
 )
 from warp_mca.kernels.contact.spring import Spring
+from warp_mca.kernels.contact.switching import face_left
 
 NOBODY = 2**31 - 1  # takes a spring over
 
@@ -121,7 +122,20 @@ def begin_crossing(
 
 
 @wp.func
-def take_over(place: int, before: int, spring: Spring, met_out: Met):
+def free_place(begin: int, end: int, b: int, spring: Spring, met: Met) -> int:
+    """The spring of an edge for a crossing with edge b that begins: the one that left it, a free one, or any open one."""
+    place, left = int(-1), int(-1)
+    for s in range(end - 1, begin - 1, -1):
+        if spring.face[s] < 0 and met.edge[s] < 0:
+            own = face_left(spring.face[s])
+            if place < 0 or own == b or (own < 0 and left != b):
+                place = s
+                left = own
+    return place
+
+
+@wp.func
+def offer(place: int, before: int, spring: Spring, met_out: Met):
     """Offer what spring `before` holds to spring `place`; of several, the first one gets it."""
     wp.atomic_min(met_out.taken, before, place)
     met_out.force[place] = spring.force[before]
@@ -172,9 +186,7 @@ def meet_kernel() -> Any:
                     before = predecessor(X, u, v, slave, master, chains, a, b, hit.normal, spring)
                     begins, rest = begin_crossing(X, u, slave, master, a, b, before, hit, spring)
                 if begins and place < 0:
-                    for s in range(end - 1, begin - 1, -1):
-                        if spring.face[s] < 0 and met_out.edge[s] < 0:
-                            place = s
+                    place = free_place(begin, end, b, spring, met_out)
                 if begins and place >= 0:
                     met_out.edge[place] = b
                     met_out.before[place] = before
@@ -184,6 +196,6 @@ def meet_kernel() -> Any:
                     met_out.du[place] = hit.du
                     met_out.rest[place] = rest
                     if before >= 0 and before != place:
-                        take_over(place, before, spring, met_out)
+                        offer(place, before, spring, met_out)
 
     return meet_edges

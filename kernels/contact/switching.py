@@ -37,6 +37,13 @@ def returns_energy(s: int, spring: Any) -> bool:
 
 
 @wp.func
+def forget(s: int, spring: Any):
+    """Let spring s owe nothing any more, where springs return energy."""
+    if spring.owed.shape[0] > 0:
+        spring.owed[s] = wp.vec3d(wp.float64(0.0), wp.float64(0.0), spring.owed[s][2])
+
+
+@wp.func
 def returning(owed: wp.float64, out: wp.float64, most: wp.float64) -> wp.float64:
     """Force [N], no more than `most`, that returns the energy `owed` [J] where a step moves the node by `out` [m]."""
     size = wp.min(most, wp.abs(owed / out))

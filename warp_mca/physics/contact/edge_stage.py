@@ -142,9 +142,9 @@ class EdgeStage(ContactStage):
             wp.launch(self.meet, part.stop - part.start, inputs, block_dim=contact.BLOCK_DIM)
 
         def press(part: slice) -> None:
-            inputs = [part.start, state.v, self.slaves, self.masters, self.slave_scene, self.mu, self.per_newton]
+            inputs = [part.start, state.v, self.slaves, self.masters, own.count, own.candidate]
+            inputs += [self.slave_scene, self.mu, self.per_newton, dt, self.met, own.spring]
             outputs = [state.normal_force[next(first)], state.flag]
-            inputs += [dt, self.met, own.spring]
             wp.launch(self.kernel, part.stop - part.start, inputs, outputs, block_dim=contact.BLOCK_DIM)
 
         def share(part: slice) -> None:

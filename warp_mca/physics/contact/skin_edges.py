@@ -130,7 +130,7 @@ def _shared(first: ContactPass) -> dict[str, Any]:
     """What a pass of edges has from that of the nodes."""
     names = (
         "mu contact law parameters stiffening friction damping face side slave_face margin longest curved "
-        "initial_overlap internal sign"
+        "initial_overlap internal returns sign"
     )
     return {name: getattr(first, name) for name in (*names.split(), "face_stiffness")}
 
