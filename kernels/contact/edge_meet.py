@@ -123,7 +123,7 @@ def begin_crossing(
 
 @wp.func
 def free_place(begin: int, end: int, b: int, spring: Spring, met: Met) -> int:
-    """The spring of an edge for a crossing with edge b that begins: the one that left it, a free one, or any open one."""
+    """The spring of an edge for a new crossing with edge b: the one that left b, a free one, or any open one."""
     place, left = int(-1), int(-1)
     for s in range(end - 1, begin - 1, -1):
         if spring.face[s] < 0 and met.edge[s] < 0:
