@@ -27,6 +27,7 @@ PEAK_LOSS = 0.3
 # Force of a flat contact over that of one wave up to which it may be that wave: with default springs, and with others,
 # which may ring at 3.4 times that force.
 WAVE = (1.3, 4.0)
+CROSSINGS = 4.0  # of a body by waves, after which a drive presses it as slowly as no wave tells
 STILL = 1e-6  # share of a relative velocity along the normal up to which bodies do not approach each other
 WEIGHT = 2.0  # times the weight of all bodies: a contact at rest of no more force bears it
 WEAK = 0.7  # force of a flat contact over that of one wave below which springs that were given are softer than waves
@@ -157,6 +158,8 @@ def spring_shares(
                 in_series = float(energy["contact"][greatest] / series[greatest]) if series[greatest] > 0.0 else 0.0
                 greatest_force = math.inf if pulled else float(force[greatest])
                 loss = _loss_of_flat(c, k, flat, share, in_series, greatest_force, ledger.time())
+            elif isinstance(contact, ContactAll) and k not in curved and _is_pressed_slowly(c, greatest):
+                loss = float(energy["contact"][greatest] / series[greatest])
             found[name] = SpringShare(share=share, loss=loss, edges=edges)
         else:
             loss = float(energy["contact"][row] / series[row])
@@ -211,6 +214,17 @@ def _loss_of_flat(
     if force > WAVE[given] * wave:
         return 1.0 - math.sqrt(1.0 - min(share, 1.0))
     return PEAK_LOSS * share if given and force < WEAK * wave else 0.0
+
+
+def _is_pressed_slowly(c: Context, row: int) -> bool:
+    """Whether drives press bodies on each other that were at rest, and waves crossed each of them before a row."""
+    time = row * c.scene.impact.output_interval
+    if c.model.V.any() or not _driven_speed(c):
+        return False
+    names = [body.name for body in c.scene.bodies if not body.rigid]
+    return all(
+        time * impedance(c, name)[1] > CROSSINGS * np.ptp(c.model.X[c.nodes(name)], axis=0).max() for name in names
+    )
 
 
 def _driven_speed(c: Context) -> float:

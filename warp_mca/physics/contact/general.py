@@ -10,7 +10,7 @@ import numpy as np
 from warp_mca.base.arrays import Array, Index
 from warp_mca.physics.contact.resting import at_rest
 from warp_mca.physics.contact.skin_edges import edge_eigenvalues, general_edges
-from warp_mca.physics.contact.stiffness import CURVED, FLAT, Inertia, node_mean
+from warp_mca.physics.contact.stiffness import CURVED, FLAT, Inertia, flat_modulus, node_mean
 from warp_mca.physics.contact.surfaces import LONGEST_LIST, surface_faces, surface_pass
 from warp_mca.scene import ContactAll, Surface
 from warp_mca.system.contact import SLOTS, ContactPass, Faces, Pairs
@@ -37,7 +37,9 @@ def general_passes(parts: Bodies, contact: ContactAll, index: int, velocity: Arr
     curved = [bool(skin.curved.any()) for skin in skins]
     for one, other in pairs:
         a, b = number[one], number[other]
-        default = CURVED if a != b and (curved[a] or curved[b]) else 0.5 * FLAT  # two equal layers in series
+        default = 0.5 * FLAT  # two equal layers in series
+        if a != b:
+            default = CURVED if curved[a] or curved[b] else _flat_default(skins[a], skins[b], (parts.K, parts.G))
         factor[a, b] = factor[b, a] = 0.5 * (default if contact.penalty is None else contact.penalty)
     union = Faces(*(np.concatenate([getattr(skin, name) for skin in skins]) for name in Faces.__dataclass_fields__))
     own = union.contact if contact.penalty is None else union.bulk
@@ -60,6 +62,22 @@ def general_passes(parts: Bodies, contact: ContactAll, index: int, velocity: Arr
     nodes, value = edge_eigenvalues(edges, parts.mass)
     added[nodes] += value
     return [item, edges], added
+
+
+def _flat_default(one: Faces, other: Faces, moduli: tuple[Array, Array]) -> float:
+    """Factor of the lower stiffness of two flat skins by E / (1 - nu^2), as `spring_stiffness` has it by their layers.
+
+    It takes `flat_modulus` in place of that, and the layers of both skins in series. Skins count by their medians.
+    """
+    plain, confined, layer = [], [], []
+    for skin in (one, other):
+        K, G = (modulus[skin.element] for modulus in moduli)
+        contact = 4.0 * G * (3.0 * K + G) / (3.0 * K + 4.0 * G)
+        stiffness = skin.contact * flat_modulus(contact, K, G) / contact
+        plain.append(float(np.median(skin.contact)))
+        confined.append(float(np.median(stiffness)))
+        layer.append(float(np.median(stiffness / skin.area)))
+    return FLAT / (1.0 + min(layer) / max(layer)) * min(confined) / min(plain)
 
 
 def _barred(X: Array, union: Faces, item: ContactPass, folds: Array) -> tuple[Index, Index]:

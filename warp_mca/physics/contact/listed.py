@@ -13,6 +13,7 @@ from warp_mca.geometry.exposure import Exposure
 from warp_mca.physics.contact.auto_penalty import settled
 from warp_mca.physics.contact.bonds import Place, bonded
 from warp_mca.physics.contact.eigenvalues import contact_eigenvalues
+from warp_mca.physics.contact.flush import bulges_over
 from warp_mca.physics.contact.resting import resting
 from warp_mca.physics.contact.skin_edges import edge_eigenvalues, edge_pass, is_two_way, no_edges
 from warp_mca.physics.contact.stiffness import Inertia
@@ -37,7 +38,11 @@ def as_settled(
     parts: Bodies, contact: Contact, slave: Faces, master: Faces | None, velocity: Array, flat: bool | None = None
 ) -> tuple[Contact, ChosenPenalty | None]:
     """A contact with all that is left to the program, and the penalty that was chosen; `flat` as in `passes_of`."""
-    soft = master is not None and _soft(parts, contact)
+    soft = (
+        contact.two_way is None
+        and master is not None
+        and (_soft(parts, contact) or _bulges(parts, contact, slave, master))
+    )
     contact = replace(contact, two_way=is_two_way(contact, slave, master, soft))
     contact, chosen = settled(parts, contact, slave, master, velocity)
     return resting(parts, contact, slave, master, velocity, flat), chosen
@@ -50,6 +55,12 @@ def _soft(parts: Bodies, contact: Contact) -> bool:
         return False
     materials = [item for body in bodies for item, _ in body_materials(body, parts.meshes[body.name])]
     return all(item.finite_only for item in materials)
+
+
+def _bulges(parts: Bodies, contact: Contact, slave: Faces, master: Faces) -> bool:
+    """`flush.bulges_over` of bodies as they are, rigid ones among them."""
+    modulus = np.where(parts.rigid, np.inf, 4.0 * parts.G * (3.0 * parts.K + parts.G) / (3.0 * parts.K + 4.0 * parts.G))
+    return bulges_over(contact, parts.X, modulus, slave, master)
 
 
 def passes_of(
