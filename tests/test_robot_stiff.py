@@ -59,3 +59,25 @@ def test_steps_are_those_of_the_slow_motion(tmp_path):
         count += 1
     assert stepper.stiff and count < 1500
     assert stepper.y[:2] == pytest.approx(way(1.0), abs=1e-10)
+
+
+ARM = """<mujoco><compiler angle="radian"/><worldbody><body name="a"><joint name="s" axis="0 1 0"/>
+  <inertial pos="0.15 0 0" mass="1.2" diaginertia="0.001 0.01 0.01"/>
+  <body name="b" pos="0.3 0 0"><joint name="e" axis="0 1 0"/>
+    <inertial pos="0.1 0 0" mass="0.7" diaginertia="0.001 0.003 0.003"/></body></body></worldbody><actuator>
+  <position name="s" joint="s" kp="2e5" kv="2e3" forcelimited="true" forcerange="-80 80"/>
+  <position name="e" joint="e" kp="1e5" kv="300"/></actuator></mujoco>"""
+
+
+def test_a_machine_that_its_stiff_servos_have_brought_to_rest_goes_on_in_long_steps(tmp_path):
+    """Rounding of their torques moves rates by 1e-14 rad/s: a step that asks for less never ends."""
+    target = np.array([0.4, -0.3])
+    machine = Machine(robot(ARM, tmp_path, ctrl=tuple(target)))
+    stepper, count = Stepper(machine), 0
+    stepper.begin(0.0, np.append(machine.start, [0.0, 0.0]), 0.3)
+    while stepper.running and count < 3000:
+        assert stepper.step() is None
+        count += 1
+    assert stepper.t == 0.3
+    upper, lower = 0.7 * 9.81 * 0.1 * np.cos(target.sum()), 9.81 * (1.2 * 0.15 + 0.7 * 0.3) * np.cos(target[0])
+    assert stepper.y[:2] == pytest.approx(target + np.array([upper + lower, upper]) / (2e5, 1e5), abs=1e-8)

@@ -60,7 +60,8 @@ def test_what_cannot_be_joined_is_refused(joint, said):
     ("given", "said"),
     [
         ({"kind": "screw"}, "Freedom.kind = 'screw': choose hinge, slide or ball"),
-        ({"kind": "ball", "stiffness": 1.0}, "Freedom ball.stiffness = 1.0: a ball has no axis for it"),
+        ({"kind": "ball", "friction": 1.0}, "Freedom ball.friction = 1.0: a ball has no axis for it"),
+        ({"kind": "ball", "rest": 1.0}, "Freedom ball.rest = 1.0: give three finite numbers"),
         ({"limits": (1.0, 0.0)}, "Freedom hinge.limits = (1.0, 0.0): give two finite numbers, the lower one first"),
         ({"motor": 3.0}, "Freedom hinge.motor = 3.0: give an Amplitude of torques, a PositionServo"),
         ({"damping": -1.0}, "Freedom hinge.damping = -1.0: give a number from 0"),

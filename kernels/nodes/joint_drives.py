@@ -53,6 +53,31 @@ def beyond(e: int, q: wp.float64, joints: RigidJoints) -> wp.float64:
 
 
 @wp.func
+def spring_way(e: int, q: wp.float64, joints: RigidJoints, state: JointPoses) -> wp.float64:
+    """How far a position is from where its spring rests [rad], [m]; of a ball a component of its rotation vector."""
+    if joints.kind[e] != wp.static(BALL):
+        return q - joints.drive[e, wp.static(REST)]
+    first = e - joints.part[e]
+    r = wp.vec3d(
+        joints.drive[first, wp.static(REST)],
+        joints.drive[first + 1, wp.static(REST)],
+        joints.drive[first + 2, wp.static(REST)],
+    )
+    half = wp.float64(0.5) * wp.length(r)
+    s = wp.sin(half) * wp.normalize(r)
+    x = wp.quat_inverse(wp.quatd(s[0], s[1], s[2], wp.cos(half))) * state.ball[first]
+    v = wp.vec3d(x[0], x[1], x[2])
+    sine = wp.length(v)
+    w = wp.abs(x[3])
+    scale = wp.float64(2.0)
+    if sine > wp.float64(1e-9):
+        scale = wp.float64(2.0) * wp.atan2(sine, w) / sine
+    if x[3] < wp.float64(0.0):
+        scale = -scale
+    return scale * v[joints.part[e]]
+
+
+@wp.func
 def friction_factor(e: int, rate: wp.float64, joints: RigidJoints) -> wp.float64:
     """Viscous factor that friction has at a rate [N m s], [N s/m]."""
     f = joints.drive[e, wp.static(FRICTION)]
@@ -105,7 +130,7 @@ def push_joint(
             q = state.position[e]
             rate = state.rate[e]
             k = joints.drive[e, wp.static(STIFFNESS)]
-            x = q - joints.drive[e, wp.static(REST)]
+            x = spring_way(e, q, joints, state)
             over = beyond(e, q, joints)
             k_over = joints.drive[e, wp.static(LIMIT_STIFFNESS)]
             drive_rate(e, state.clock[j], dt, moves, joints, state, step_out)

@@ -84,8 +84,8 @@ class Motors(NamedTuple):
 def freedoms_of(machine: Machine, joint: int, qpos: Array, gearing: Gearing) -> tuple[Freedom, ...]:
     """The freedom of a joint of the file, at coordinates `qpos`, with what tendons and equalities do to it.
 
-    A ball with a spring, dry friction, a rotor or a range is three hinges, the first along the axis about which it is
-    turned; that is right to first order in what it turns in the impact.
+    A ball with dry friction or a range is three hinges, the first along the axis about which it is turned; that is right
+    to first order in what it turns in the impact.
 
     Positions count from the pose in which axes are given, so that `ref` of the file is taken off.
 
@@ -129,6 +129,12 @@ def freedoms_of(machine: Machine, joint: int, qpos: Array, gearing: Gearing) -> 
     return (own,)
 
 
+def three_hinges(machine: Machine, joint: int) -> bool:
+    """Whether three hinges stand for a ball: it has dry friction or a range."""
+    dry = bool(machine.model.dof_frictionloss[int(machine.model.jnt_dofadr[joint])])
+    return dry or any(item.joint == joint for item in machine.sockets)
+
+
 def _ball(machine: Machine, joint: int, quaternion: Array) -> tuple[Freedom, ...]:
     """The freedoms of a ball: its spring gives -k r, r the rotation vector from rest in the link's frame."""
     model, dof = machine.model, int(machine.model.jnt_dofadr[joint])
@@ -136,10 +142,11 @@ def _ball(machine: Machine, joint: int, quaternion: Array) -> tuple[Freedom, ...
     damping, friction = float(model.dof_damping[dof]), float(model.dof_frictionloss[dof])
     at: Any = tuple(float(v) for v in model.jnt_pos[joint])
     socket = next((item for item in machine.sockets if item.joint == joint), None)
-    if not (stiffness or armature or friction or socket):
-        return (Freedom(kind="ball", at=at, damping=damping),)
     rotated, place = np.zeros(3), int(model.jnt_qposadr[joint])
     machine.mj.mju_subQuat(rotated, quaternion, model.qpos_spring[place : place + 4])
+    if not three_hinges(machine, joint):
+        rest: Any = tuple(float(-r) for r in rotated) if stiffness else 0.0
+        return (Freedom(kind="ball", at=at, stiffness=stiffness, rest=rest, damping=damping, armature=armature),)
     own: dict[str, Any] = {"at": at, "stiffness": stiffness, "damping": damping, "armature": armature}
     own |= {"friction": friction, "friction_rate": FRICTION_RATE}
     axes = axes_of(quaternion)

@@ -11,6 +11,7 @@ import numpy as np
 from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.base.rotation import rotation_matrix, rotation_vector
+from warp_mca.robots.drives import three_hinges
 from warp_mca.robots.gearing import joint_name
 from warp_mca.robots.handoff import REST
 from warp_mca.robots.machine import Machine
@@ -139,6 +140,10 @@ class _Ends:
         before = np.array(found["centre"]) - np.array(found["displacement"])
         return self.moved[name][0] + self._turned[name] @ (self._frame(name)[0] - before)
 
+    def start(self, name: str) -> Array:
+        """From the frame of a link to the world at the start, shape (3, 3)."""
+        return self._frame(self._holder(name))[1]
+
     def _holder(self, name: str) -> str:
         """What rides on a flexible link in its place, where something does."""
         return name + REST if name + REST in self.moved else name
@@ -190,8 +195,12 @@ def _take_joints(machine: Machine, link: int, q: Array, rotor: Array, swing: Rob
         q[at : at + 4] = machine.quaternion(turned)
         dof = int(model.jnt_dofadr[first])
         if model.dof_armature[dof]:
-            axes = axes_of(swing.qpos[at : at + 4])
-            rotor[dof : dof + 3] = _turning(axes, *ends.joint(joint_name(machine, link)))
+            positions, rates = ends.joint(joint_name(machine, link))
+            if three_hinges(machine, first):
+                turns = _turning(axes_of(swing.qpos[at : at + 4]), positions, rates)
+            else:
+                turns = ends.start(name).T @ rates
+            rotor[dof : dof + 3] = turns
         return
     positions, rates = ends.joint(joint_name(machine, link))
     for k, (position, rate) in enumerate(zip(positions, rates, strict=True)):

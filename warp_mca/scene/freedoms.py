@@ -124,12 +124,13 @@ class Freedom:
         at: point of the axis, or of a ball [m]; None takes that of the joint.
         position: q in the pose in which the scene places the bodies [rad], [m].
         stiffness: of a spring [N m/rad], [N/m].
-        rest: position at which the spring is at rest [rad], [m].
+        rest: position at which the spring is at rest [rad], [m]; of a ball, whose spring gives -k r, r the rotation vector
+            from rest, the vector from where the scene places the body to rest, in the body's frame; 0 is there.
         damping: of a viscous damper [N m s/rad], [N s/m]; a ball has one about all axes.
         friction: greatest torque [N m] or force [N] of Coulomb friction.
         friction_rate: rate above which friction is whole: it is `friction` times tanh(q' / friction_rate) [rad/s],
             [m/s].
-        armature: inertia of a rotor that turns at the rate of the joint [kg m^2], [kg].
+        armature: inertia of a rotor that turns at the rate of the joint [kg m^2], [kg]; of a ball about all axes.
         limits: least and greatest position [rad], [m]; None for no limits.
         limit_stiffness: of the springs beyond the limits [N m/rad], [N/m]. They shorten the time step where their
             frequency asks for it.
@@ -144,7 +145,7 @@ class Freedom:
     at: Vec3 | None = None
     position: float = 0.0
     stiffness: float = 0.0
-    rest: float = 0.0
+    rest: float | Vec3 = 0.0
     damping: float = 0.0
     friction: float = 0.0
     friction_rate: float = 1e-3
@@ -162,7 +163,11 @@ class Freedom:
         validate.directions(owner, axis=self.axis)
         if self.at is not None:
             validate.vectors(owner, at=self.at)
-        validate.within(owner, -MOST, MOST, position=self.position, rest=self.rest)
+        validate.within(owner, -MOST, MOST, position=self.position)
+        if self.kind == "ball" and self.rest != 0.0:
+            validate.vectors(owner, rest=self.rest)  # type: ignore[arg-type]
+        else:
+            validate.within(owner, -MOST, MOST, rest=self.rest)  # type: ignore[arg-type]
         validate.within(
             owner,
             0.0,
@@ -187,7 +192,7 @@ class Freedom:
             self._check_ball(owner)
 
     def _check_ball(self, owner: str) -> None:
-        for name in ("position", "stiffness", "friction", "armature", "limits", "motor", "follows"):
+        for name in ("position", "friction", "limits", "motor", "follows"):
             if getattr(self, name):
                 remedy = "a ball has no axis for it; leave it out, or give three hinges whose axes meet"
                 raise bad_value(f"{owner}.{name}", validate.brief(getattr(self, name)), remedy)

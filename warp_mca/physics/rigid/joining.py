@@ -106,13 +106,14 @@ def _body_joint(
     for freedom, at in zip(whole.freedoms, whole.points, strict=True):
         o = origin + R @ np.array(at) - place
         axes = np.eye(3) if freedom.kind == "ball" else (R @ np.array(freedom.unit))[None]
+        rest = (R @ np.broadcast_to(freedom.rest, 3)).tolist() if freedom.kind == "ball" else [freedom.rest]
         for k, direction in enumerate(axes):
             kind.append(KINDS[freedom.kind])
             part.append(k)
             axis.append(direction)
             point.append(o)
             position.append(freedom.position)
-            drive.append(_drive(freedom))
+            drive.append(_drive(freedom, rest[k]))
             motor.append(_motor(freedom))
             tables.append(_table(freedom))
         if freedom.kind != "ball":
@@ -148,12 +149,12 @@ def _body_joint(
     return item
 
 
-def _drive(freedom: Freedom) -> list[float]:
+def _drive(freedom: Freedom, rest: float) -> list[float]:
     """Columns of `RigidJoints.drive`."""
     low, high = freedom.limits or (-np.inf, np.inf)
     servo = freedom.motor if isinstance(freedom.motor, PositionServo) else None
     least, most = servo.limits if servo and servo.limits else (-np.inf, np.inf)
-    found = [freedom.stiffness, freedom.rest, freedom.damping, freedom.friction, freedom.friction_rate]
+    found = [freedom.stiffness, rest, freedom.damping, freedom.friction, freedom.friction_rate]
     found += [freedom.armature, low, high, freedom.limit_stiffness if freedom.limits else 0.0, freedom.limit_damping]
     return [*found, servo.kp if servo else 0.0, servo.kv if servo else 0.0, least, most]
 
