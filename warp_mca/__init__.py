@@ -79,7 +79,21 @@ if TYPE_CHECKING:
     from warp_mca.accuracy.simulation import mesh, run
     from warp_mca.accuracy.tradeoff import tradeoff
     from warp_mca.decks.deck import read_deck
-    from warp_mca.geometry import Box, Cad, LugRod, Mesh, MeshFile, NestedPlate, Part, Parts, Plate, Rod, Select, Sphere
+    from warp_mca.geometry import (
+        Box,
+        Cad,
+        Finer,
+        LugRod,
+        Mesh,
+        MeshFile,
+        NestedPlate,
+        Part,
+        Parts,
+        Plate,
+        Rod,
+        Select,
+        Sphere,
+    )
     from warp_mca.phases.quality import quality_table
     from warp_mca.registration import register
     from warp_mca.results.cfc import cfc_filter
@@ -97,6 +111,7 @@ if TYPE_CHECKING:
 _LAZY = {
     "Box": "warp_mca.geometry",
     "Cad": "warp_mca.geometry",
+    "Finer": "warp_mca.geometry",
     "LugRod": "warp_mca.geometry",
     "Mesh": "warp_mca.geometry",
     "MeshFile": "warp_mca.geometry",
@@ -201,6 +216,7 @@ __all__ = [
     "Plate",
     "MeshFile",
     "Cad",
+    "Finer",
     "Assembly",
     "drop_test",
     "POSES",

@@ -2,6 +2,7 @@
 
 from warp_mca.geometry.box import Box
 from warp_mca.geometry.cad import Cad
+from warp_mca.geometry.cad_finer import Finer
 from warp_mca.geometry.inertia_brick import InertiaBrick
 from warp_mca.geometry.lug_rod import LugRod
 from warp_mca.geometry.mesh import Mesh
@@ -17,6 +18,7 @@ from warp_mca.geometry.sphere import Sphere
 __all__ = [
     "Box",
     "Cad",
+    "Finer",
     "InertiaBrick",
     "LugRod",
     "Mesh",

@@ -11,6 +11,7 @@ from warp_mca.base import validate
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.geometry.cad_cells import read_cells
 from warp_mca.geometry.cad_drawing import UNITS, diagonal, draw, explained, file_stamp, reading_time
+from warp_mca.geometry.cad_finer import Finer, set_finer
 from warp_mca.geometry.cad_solids import chosen_solids, glued
 from warp_mca.geometry.cad_volume import divided, solid_volumes
 from warp_mca.geometry.cad_walls import LEAST_ACROSS, MOST_ACROSS, set_sizes
@@ -26,6 +27,7 @@ from warp_mca.geometry.shape_volume import of_cells
 _ALGORITHMS = ((10.0, 6.0), (1.0, 6.0), (10.0, 1.0), (1.0, 5.0))
 _FEWER = (0.5, 0.25)  # shares of the cells over a wall that are tried where all algorithms fail
 _MESH, _ELEMENT = 60.0, 1e-4  # time that gmsh may take to mesh any part, and for an element, many times its need [s]
+_FINER = 100  # times the cells of a mesh that finer places may add, for that time
 _KEPT = 32  # meshes that stay in memory, so that a body that is placed on a plane is not meshed twice
 
 
@@ -52,6 +54,7 @@ class Cad:
         glue: distance up to which faces of two solids count as one, whose nodes they share [m]; None leaves solids
             that touch pieces of their own. Each keeps its volume as the file has it.
         notes: sentences that the mesh gets (`Mesh.notes`), of whoever looked into the file.
+        finer: places with smaller cells, as where the part strikes.
     """
 
     path: str | Path
@@ -62,6 +65,7 @@ class Cad:
     solids: tuple[str, ...] = ()
     glue: float | None = None
     notes: tuple[str, ...] = ()
+    finer: tuple[Finer, ...] = ()
 
     def __post_init__(self) -> None:
         validate.plain(self)
@@ -76,14 +80,16 @@ class Cad:
         validate.within("Cad", LEAST_ACROSS, MOST_ACROSS, across=self.across)
         check_selections("Cad", self.select)
         validate.members("Cad", str, solids=self.solids, notes=self.notes)
+        validate.members("Cad", Finer, finer=self.finer)
         if self.glue is not None and Path(self.path).suffix.lower() == ".stl":
             raise bad_value("Cad.glue", self.glue, "an STL file holds one solid; leave it out")
 
     def refined(self, factor: float) -> Cad:
         """The same part with tetrahedra `factor` times smaller."""
+        finer = tuple(place.refined(factor) for place in self.finer)
         if self.size is None:
-            return replace(self, across=self.across * factor)
-        return replace(self, size=self.size / factor)
+            return replace(self, across=self.across * factor, finer=finer)
+        return replace(self, size=self.size / factor, finer=finer)
 
     @property
     def volume(self) -> float | None:
@@ -156,6 +162,7 @@ def _meshed_by(cad: Cad, algorithms: dict[str, float]) -> Mesh:
         RequestError: others would fail as well.
     """
     path = str(cad.path)
+    coarse = _meshed(replace(cad, finer=()), file_stamp(path)) if cad.finer else None
     scale = cad.scale or UNITS[Path(path).suffix.lower()]
     with gmsh_session(reading_time(path), **algorithms) as gmsh, explained(path):
         notes = draw(gmsh, path)
@@ -166,7 +173,11 @@ def _meshed_by(cad: Cad, algorithms: dict[str, float]) -> Mesh:
             names = glued(gmsh, names, cad.glue / scale)
             exact = divided(solid_volumes(gmsh, path), list(names.values()), whole)
         try:
-            allow(gmsh, _MESH + reading_time(path) + _ELEMENT * _sized(gmsh, cad, scale))
+            if coarse is None:
+                allow(gmsh, _MESH + reading_time(path) + _ELEMENT * _sized(gmsh, cad, scale))
+            else:
+                set_finer(gmsh, cad.finer, coarse, scale)
+                allow(gmsh, _MESH + reading_time(path) + _ELEMENT * _FINER * coarse.cell_count)
             gmsh.model.mesh.generate(3)
             gmsh.option.setNumber("Mesh.SecondOrderLinear", float(Path(path).suffix.lower() == ".stl"))
             gmsh.model.mesh.setOrder(2)

@@ -25,7 +25,7 @@ def body_report(
     """Mass [kg] of each body, without what mass scaling adds, and error [-] of the mass of its cells, by its name.
 
     The error is None where nothing is known of the shape that the mesh stands for, and where the mass is given.
-    `points` count as mass alone.
+    `points` count as mass alone. Where a body has places of finer cells, the least size of these is there [m].
     """
     found: dict[str, dict[str, float | None]] = {}
     for body in bodies:
@@ -37,6 +37,8 @@ def body_report(
         carried = sum(item.mass for item in points if item.body == body.name)
         own, error = (float(mass.sum()), error) if body.mass is None else (body.mass, None)
         found[body.name] = {"mass": own + carried, "mass_error": error}
+        if finer := getattr(body.geometry, "finer", ()):
+            found[body.name]["finer_size"] = min(place.size for place in finer)
     return found
 
 

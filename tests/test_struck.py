@@ -1,0 +1,138 @@
+"""Cells where a drop strikes: the depth that it crushes beside closed forms, sizes there and elsewhere."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import warp_mca as mca
+from warp_mca.base.rotation import rotation_matrix
+from warp_mca.geometry.cad_finer import node_sizes
+from warp_mca.scene.extent import extent_of, mesh_of
+from warp_mca.scene.struck import ROWS
+
+ABS = mca.library.ABS
+HEIGHT = 1.2
+SIDES = np.array((0.03, 0.012, 0.02))  # of the block [m]
+ENERGY = ABS.rho * SIDES.prod() * 9.81 * HEIGHT
+EDGE, CORNER = "xmin-zmin", "xmin-ymin-zmin"
+
+
+@pytest.fixture(scope="module")
+def block(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A STEP file of a block, and beside it round.step, which has round edges."""
+    import gmsh
+
+    folder = tmp_path_factory.mktemp("block")
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        shapes = gmsh.model.occ
+        for name, radius in (("block", 0.0), ("round", 2.0)):
+            solid = shapes.addBox(0, 0, 0, *(1e3 * SIDES))
+            shapes.synchronize()
+            if radius:
+                shapes.fillet([solid], [edge for _, edge in gmsh.model.getEntities(1)], [radius])
+                shapes.synchronize()
+            gmsh.write(str(folder / f"{name}.step"))
+            gmsh.clear()
+    finally:
+        gmsh.finalize()
+    return folder / "block.step"
+
+
+def dropped(path: Path, pose: str, struck: float | str = "auto", **changes: Any) -> mca.Body:
+    """The block in its pose, made of ABS."""
+    options: dict[str, Any] = {"material": ABS, **changes}
+    across, size = options.pop("across", 2.0), options.pop("size", None)
+    body = mca.Body(name="block", geometry=mca.Cad(path, across=across, size=size), **options)
+    return mca.drop_test(body, height=HEIGHT, pose=pose, struck=struck).bodies[0]
+
+
+def sizes(body: mca.Body) -> tuple[np.ndarray, np.ndarray]:
+    """Height above the floor and mean edge [m] of the corners of its cells."""
+    mesh = mesh_of(body)
+    placed = mesh.points @ rotation_matrix(np.array(body.rotation)).T + np.array(body.position)
+    size = node_sizes(mesh.points, mesh.others["tetra10"][:, :4])
+    return placed[size > 0.0, 2], size[size > 0.0]
+
+
+def slope(body: mca.Body) -> np.ndarray:
+    """Of the block's three sides against the floor's normal: direction cosines [-]."""
+    return np.abs(rotation_matrix(np.array(body.rotation))[2])
+
+
+@pytest.mark.parametrize("across", [2.0, 3.0])
+def test_an_edge_has_cells_over_the_depth_that_its_energy_crushes(block: Path, across: float):
+    """Of a strong block, since cells of a soft one are small enough: length d^2 / (2 n_x n_z) yields."""
+    strong = dataclasses.replace(ABS, sigma_y=2e6)
+    body = dropped(block, EDGE, across=across, material=strong)
+    (place,) = body.geometry.finer  # pyright: ignore[reportAttributeAccessIssue]
+    n = slope(body)
+    depth = math.sqrt(2.0 * n[0] * n[2] * ENERGY / strong.sigma_y / SIDES[1])
+    assert place.size == pytest.approx(depth / (ROWS * across), rel=0.01)
+    assert body.kinematics == "finite"
+
+
+def test_a_corner_is_crushed_as_deep_as_its_tip_holds(block: Path):
+    soft = dataclasses.replace(ABS, sigma_y=10e6)
+    body = dropped(block, CORNER, material=soft)
+    (place,) = body.geometry.finer  # pyright: ignore[reportAttributeAccessIssue]
+    depth = (6.0 * slope(body).prod() * ENERGY / soft.sigma_y) ** (1.0 / 3.0)
+    assert place.size == pytest.approx(depth / (ROWS * 2.0), rel=0.01)
+
+
+def test_cells_are_fine_where_it_strikes_and_as_before_elsewhere(block: Path):
+    plain, fine = (sizes(dropped(block, EDGE, struck)) for struck in ("off", 0.5e-3))
+    assert fine[1][fine[0] < 0.4e-3].mean() == pytest.approx(0.5e-3, rel=0.25)
+    far = 0.6 * fine[0].max()
+    assert fine[1][fine[0] > far].mean() == pytest.approx(plain[1][plain[0] > far].mean(), rel=0.15)
+    assert len(fine[0]) < 4 * len(plain[0])
+
+
+def test_round_edges_that_are_meshed_again_lie_above_the_floor(block: Path):
+    body = dropped(block.with_name("round.step"), EDGE)
+    heights, size = sizes(body)
+    assert heights.min() == pytest.approx(1e-6, abs=1e-7)
+    assert size.min() < 0.5e-3
+
+
+@pytest.mark.parametrize(
+    ("pose", "struck", "changes"),
+    [
+        ("zmin", "auto", {}),
+        (EDGE, "off", {}),
+        (EDGE, "auto", {"size": 3e-3}),
+        (EDGE, "auto", {"material": mca.library.CONCRETE_C30}),
+        (EDGE, "auto", {"rigid": True}),
+        (EDGE, 5e-3, {}),
+    ],
+)
+def test_what_is_left_as_it_is(block: Path, pose: str, struck: float | str, changes: dict[str, Any]):
+    """Flat sides, sizes that are given, what does not yield, cells that are fine enough."""
+    body = dropped(block, pose, struck, **changes)
+    assert body.geometry.finer == () and body.kinematics == "corotational"  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_a_size_given_for_the_drop_counts_for_bodies_with_their_own(block: Path):
+    body = dropped(block, EDGE, 0.5e-3, size=4e-3)
+    (place,) = body.geometry.finer  # pyright: ignore[reportAttributeAccessIssue]
+    assert place.size == 0.5e-3
+    assert body.geometry.refined(2.0).finer[0].size == 0.25e-3  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_other_words_are_refused(block: Path):
+    with pytest.raises(mca.RequestError, match=r"drop_test\.struck = 'fine': choose auto, off, or a size of cells"):
+        dropped(block, EDGE, "fine")
+    with pytest.raises(mca.RequestError, match=r"drop_test\.struck"):
+        dropped(block, EDGE, -1.0)
+
+
+def test_mass_is_that_of_all_parts(block: Path):
+    body = mca.Body(name="block", geometry=mca.Cad(block), material=ABS)
+    assert extent_of((body,)).mass == pytest.approx(ABS.rho * SIDES.prod(), rel=1e-9)

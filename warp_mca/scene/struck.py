@@ -1,0 +1,139 @@
+"""Owns how fine cells are where a drop strikes: edges and corners that yield are crushed as deep as energy takes them.
+
+Crushing to the depth d takes the work W(d), the sum over cells of yield stress times volume below d. It uses up the
+energy of the fall where W(d) = m g h. W grows as d on a face, as d^1.5 on a round edge, as d^2 on an edge or a round
+corner and as d^3 on a corner: the exponent tells whether the place is flat.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import combinations
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from warp_mca.base.arrays import Array
+from warp_mca.base.rotation import rotation_matrix
+from warp_mca.geometry.cad_finer import Finer
+from warp_mca.scene.bodies import Body
+from warp_mca.scene.extent import cell_values
+
+if TYPE_CHECKING:
+    from warp_mca.geometry.mesh import Mesh
+
+ROWS = 2.0  # cells over the crushed depth, for each one over a wall [-]
+PENALTY = 5.0  # of their contact with the floor: the default of bodies with flat faces suits these, not their edges [-]
+FLAT = 1.25  # exponent of W(d) up to which a place is flat [-]
+_FINEST = 8.0  # times smaller than the cells there, at most [-]
+_WORTH = 0.7  # of their size: cells that are not smaller are left as they are [-]
+_LEAST, _MOST = 1e-5, 0.2  # depths over the height of the parts, below which all is flat and above which none is [-]
+_APART = 1e-5  # of the height of a cell, by which corners at one height are taken apart [-]
+_STEP, _HALVINGS = 1.02, 60  # of the depth, for the exponent [-]; of the interval in which it lies
+
+
+def finer_where_struck(
+    bodies: Sequence[Body], meshes: Sequence[Mesh], energy: float, struck: float | str
+) -> list[Body]:
+    """Bodies above the floor z = 0, with finer cells and strains taken as large where they strike it; [] if all stay.
+
+    Args:
+        bodies: in their places.
+        meshes: of these.
+        energy: of the fall [J].
+        struck: size of cells there [m], "auto" or "off", as in `drop_test`.
+    """
+    from warp_mca.geometry.cad import Cad
+
+    drawn = [(body, mesh) for body, mesh in zip(bodies, meshes, strict=True) if isinstance(body.geometry, Cad)]
+    if struck == "off" or not drawn:
+        return []
+    parts = {body.name: _cells(body, mesh) for body, mesh in drawn}
+    lowest = min(float(part.heights.min()) for part in parts.values())
+    heights = np.concatenate([part.heights for part in parts.values()]) - lowest
+    depth, exponent = crushed_depth(heights, np.concatenate([part.work for part in parts.values()]), energy)
+    depth = depth if exponent > FLAT else 0.0
+    found = [_finer(body, parts.get(body.name), lowest, depth, struck) for body in bodies]
+    return found if any(one is not other for one, other in zip(found, bodies, strict=True)) else []
+
+
+class _Cells(NamedTuple):
+    """Tetrahedra of a body in its place.
+
+    Attributes:
+        heights: of their corners above the floor [m], rising, shape (cell_count, 4), float64.
+        work: of crushing each of them: yield stress times volume [J], shape (cell_count,), float64.
+        size: mean edge of each of them [m], shape (cell_count,), float64.
+    """
+
+    heights: Array
+    work: Array
+    size: Array
+
+
+def _cells(body: Body, mesh: Mesh) -> _Cells:
+    from warp_mca.geometry.cell_types import TETRA10, linear_type
+
+    cells = mesh.others[TETRA10.name][:, : linear_type(TETRA10.name).corners]
+    corners = (mesh.points @ rotation_matrix(np.array(body.rotation)).T + np.array(body.position))[cells]
+    volume = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6.0
+    edges = [corners[:, i] - corners[:, j] for i, j in combinations(range(4), 2)]
+    size = np.mean([np.linalg.norm(edge, axis=1) for edge in edges], axis=0)
+    strength = np.inf if body.rigid else cell_values(body, mesh, "yield_stress")
+    return _Cells(np.sort(corners[:, :, 2], axis=1), volume * strength, size)
+
+
+def _finer(body: Body, cells: _Cells | None, lowest: float, depth: float, struck: float | str) -> Body:
+    """A body with finer cells if it is struck and they are worth it, else as it is; `depth` is 0 where all is flat."""
+    geometry: Any = body.geometry
+    if cells is None or body.rigid or (struck == "auto" and (geometry.size is not None or not depth)):
+        return body
+    near = cells.heights[:, 0] <= lowest + depth
+    if not near.any():
+        return body
+    usual = float(cells.size[near].mean())
+    size = max(depth / (ROWS * geometry.across), usual / _FINEST) if isinstance(struck, str) else struck
+    if size > _WORTH * usual:
+        return body
+    turn = rotation_matrix(np.array(body.rotation))
+    above: Any = turn.T @ ((0.0, 0.0, lowest + max(depth, size)) - np.array(body.position))
+    place = Finer(point=tuple(above.tolist()), normal=tuple(turn[2].tolist()), size=size)
+    return replace(body, geometry=replace(geometry, finer=(*geometry.finer, place)), kinematics="finite")
+
+
+def crushed_depth(heights: Array, work: Array, energy: float) -> tuple[float, float]:
+    """Depth that a fall crushes [m], and the exponent of the work over the depth there; 0 and 1 where all is flat.
+
+    Args:
+        heights: of the corners of tetrahedra above the floor [m], rising, shape (cell_count, 4), float64.
+        work: of crushing each of them [J], shape (cell_count,), float64.
+        energy: of the fall [J].
+    """
+    top = float(heights.max())
+    low, high = _LEAST * top, _MOST * top
+    near = heights[:, 0] < _STEP * high
+    heights, work = heights[near], work[near]
+    if _work(heights, work, low) >= energy:
+        return 0.0, 1.0
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if _work(heights, work, middle) >= energy else (middle, high)
+    ratio = _work(heights, work, high * _STEP) / max(_work(heights, work, high / _STEP), 1e-300)
+    return high, math.log(ratio) / (2.0 * math.log(_STEP)) if math.isfinite(ratio) else math.inf
+
+
+def _work(heights: Array, work: Array, depth: float) -> float:
+    """Of crushing tetrahedra to a depth [J]: of each that share of its volume which lies below.
+
+    The share is the divided difference of (depth - z)^3, cut off at 0, over the heights z of the corners.
+    """
+    reached = heights[:, 0] < depth
+    z = heights[reached]
+    z = z + _APART * (z[:, 3:] - z[:, :1]) * np.arange(4.0)
+    share = np.zeros(len(z))
+    for i in range(4):
+        others = [j for j in range(4) if j != i]
+        share += np.maximum(depth - z[:, i], 0.0) ** 3 / np.prod(z[:, others] - z[:, i : i + 1], axis=1)
+    return float((np.clip(share, 0.0, 1.0) * work[reached]).sum())
