@@ -79,8 +79,7 @@ def run(args: argparse.Namespace) -> None:
 
 def _needed(args: argparse.Namespace, request: Request) -> list[str]:
     """Modules that the run will use, which take long to import."""
-    swings = ["scipy.integrate"] if request.scene.rigid else []
-    return [*swings, *(["matplotlib.backends.backend_agg"] if args.figures == "png" else [])]
+    return ["matplotlib.backends.backend_agg"] if args.figures == "png" else []
 
 
 def _tell(args: argparse.Namespace, request: Request, result: Result, out: Path, recorders: Sequence[Recorder]) -> None:
