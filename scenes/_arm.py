@@ -35,7 +35,8 @@ def _approach_angle(
     names: tuple[str, ...], length: float, radius: float, H: float, gravity: float, theta: Angles
 ) -> float:
     """Angle of the last link at contact [rad], by the slender-rod chain: where the tip's mesh must be fine."""
-    from warp_mca.rigid.chain import Chain, slender_link
+    from warp_mca.rigid.chain import Chain
+    from warp_mca.rigid.link import slender_link
     from warp_mca.rigid.swing import swing
 
     count, last = len(names), names[-1]
@@ -54,7 +55,7 @@ def _approach_angle(
             height -= length * math.cos(angle[k])
         return height - centre * math.cos(angle[-1]) - radius
 
-    angle = round(float(swing(chain, theta, [0.0] * count, gap, t_max=5.0).theta[-1]), 3)
+    angle = round(float(swing(chain, theta, [0.0] * count, gap, t_max=5.0, kept=False).theta[-1]), 3)
     if abs(angle) > math.radians(60.0):
         remedy = f"{last} would strike at {math.degrees(angle):.0f} deg, beyond the tip's fine end; raise H"
         raise bad_value("H", H, remedy)

@@ -13,7 +13,7 @@ from warp_mca.recorders.colours import PALETTE, ColourScale, levels, packed
 from warp_mca.results.energy_figure import plot_energies, save_energies
 from warp_mca.results.figure_style import engineering
 from warp_mca.results.force_figure import plot_forces
-from warp_mca.results.path_figures import plot_paths, plot_waves, save_path_figures
+from warp_mca.results.path_figures import plot_paths, plot_waves, save_path_curves, save_waves
 from warp_mca.results.paths import PathHistory
 from warp_mca.results.result import Result
 from warp_mca.scene.materials import Elastic
@@ -139,15 +139,15 @@ def test_panels_of_paths_say_what_they_are_and_have_scales_of_their_own():
 def test_files_are_png_of_sensible_size(tmp_path: Path):
     assert_png(save_energies(tmp_path / "energies.png", result()))
     assert_png(save_snapshot(tmp_path / "snapshot.png", {"cube": cube()}, 0.0))
-    for path in save_path_figures(tmp_path, along(pulse(5092.0))):
-        assert_png(path)
+    assert_png(save_path_curves(tmp_path / "paths.png", along(pulse(5092.0))))
+    assert_png(save_waves(tmp_path / "waves.png", along(pulse(5092.0))))
 
 
 def test_bodies_at_rest_can_be_drawn(tmp_path: Path):
     still = Skin(cube().points, cube().quads, np.zeros(8))
     assert save_snapshot(tmp_path / "still.png", {"cube": still}, 0.0).stat().st_size > 0
     silent = PathHistory("Path 1", np.linspace(0.0, 0.4, 5), np.zeros((len(TIME), 5, 6), dtype=np.float32))
-    assert all(path.is_file() for path in save_path_figures(tmp_path, along(silent)))
+    assert all(save(tmp_path / "silent.png", along(silent)).is_file() for save in (save_path_curves, save_waves))
 
 
 @pytest.mark.parametrize(

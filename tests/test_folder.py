@@ -28,11 +28,10 @@ MOVES = len(FILES) + len(PATH_FILES)
 @pytest.fixture(autouse=True)
 def quick_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures that take no time."""
-    for figure, name in (("force", "forces"), ("energy", "energies")):
+    for figure, name in (("force", "forces"), ("energy", "energies"), ("path", "path_curves"), ("path", "waves")):
         draw = lambda file, result: file.write_text(str(result.summary))  # noqa: E731
-        monkeypatch.setattr(f"warp_mca.results.{figure}_figure.save_{name}", draw)
-    both = lambda folder, result: [(folder / name).write_text(str(result.summary)) for name in PATH_FILES[1:]]  # noqa: E731
-    monkeypatch.setattr("warp_mca.results.path_figures.save_path_figures", both)
+        module = f"{figure}_figures" if figure == "path" else f"{figure}_figure"
+        monkeypatch.setattr(f"warp_mca.results.{module}.save_{name}", draw)
 
 
 def result(number: int, *, paths: bool = True) -> Result:

@@ -8,8 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from warp_mca.geometry import Box
 from warp_mca.rigid.body_motion import body_motion, held_axes
-from warp_mca.rigid.chain import Chain, mesh_link
+from warp_mca.rigid.chain import Chain
 from warp_mca.rigid.handback import deformed_chain, hand_back
+from warp_mca.rigid.link import mesh_link
 from warp_mca.rigid.loads import Loads, Table
 from warp_mca.rigid.placement import Placement, link_placements
 from warp_mca.scene import Body, Fixed, ImpactPhase, Prescribed, Scene

@@ -1,5 +1,6 @@
 """Owns the tests of what runs of one process keep for the next: meshes of recipes, and swings."""
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -84,6 +85,17 @@ def test_a_run_compares_a_mesh_once():
 
     with unchanged():
         assert mesh(alone(Stretched()), {})["it"].cell_volumes.sum() == pytest.approx(3.0)
+
+
+def test_a_mesh_from_another_process_comes_with_what_is_known_of_it_as_it_is():
+    own = mca.Box(size=(1.0, 1.0, 1.0), divisions=(2, 2, 2)).build()
+    volumes = own.cell_volumes
+    came = pickle.loads(pickle.dumps(own))
+    np.testing.assert_array_equal(came.known["integrals"][1], volumes)
+    came.points[:, 0] *= 2.0
+    assert not came.known and came.cell_volumes.sum() == pytest.approx(2.0)
+    own.points[:, 0] *= 3.0
+    assert pickle.loads(pickle.dumps(own)).cell_volumes.sum() == pytest.approx(3.0)
 
 
 def test_a_run_sees_what_changed_since_the_one_before():

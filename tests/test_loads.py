@@ -7,8 +7,9 @@ import pytest
 
 import warp_mca as mca
 from warp_mca.base.errors import RequestError
-from warp_mca.rigid.chain import Chain, Link, slender_link
+from warp_mca.rigid.chain import Chain
 from warp_mca.rigid.flow import flow
+from warp_mca.rigid.link import Link, slender_link
 from warp_mca.rigid.loads import Loads, Table
 from warp_mca.rigid.swing import swing_until
 

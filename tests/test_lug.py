@@ -13,8 +13,9 @@ from test_pin_limit import LENGTH, SIDE, extra_length
 import warp_mca as mca
 from warp_mca.geometry.lug import EYE, HOLE, SHOULDER, SLOT
 from warp_mca.geometry.quality import check, doubled_nodes, edge_lengths, scaled_jacobian, volumes
-from warp_mca.rigid.chain import Chain, slender_link
+from warp_mca.rigid.chain import Chain
 from warp_mca.rigid.handback import deformed_chain
+from warp_mca.rigid.link import slender_link
 from warp_mca.scene.ties import Pin
 
 

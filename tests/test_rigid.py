@@ -7,7 +7,8 @@ import pytest
 from scipy.special import ellipk
 
 from warp_mca.base.errors import RequestError
-from warp_mca.rigid.chain import Chain, Link, link_axes, mesh_link, slender_link
+from warp_mca.rigid.chain import Chain, link_axes
+from warp_mca.rigid.link import Link, mesh_link, slender_link
 from warp_mca.rigid.swing import swing
 
 LENGTH, RADIUS, HEIGHT = 0.21, 0.013, 0.37  # Table 1 [m]

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from warp_mca.geometry import Box
-from warp_mca.rigid.chain import Chain, Link, slender_link
+from warp_mca.rigid.chain import Chain
+from warp_mca.rigid.link import Link, slender_link
 from warp_mca.rigid.placement import Placement, link_placements
 from warp_mca.rigid.plain_chain import acceleration_of, end_point
 from warp_mca.rigid.swing import swing, swing_until

@@ -184,8 +184,8 @@ MUTATIONS: dict[str, Mutation] = {
     "rate_force_reversed": Mutation(
         "centrifugal forces of the rigid chain have the wrong sign",
         "warp_mca/rigid/plain_chain.py",
-        "turning = uy * wx - ux * wy",
-        "turning = ux * wy - uy * wx",
+        "turning, M10 = uy * wx - ux * wy,",
+        "turning, M10 = ux * wy - uy * wx,",
     ),
     "hand_off_spins_backwards": Mutation(
         "nodes take the link's angular velocity with the wrong sign at hand-off",
@@ -202,8 +202,8 @@ MUTATIONS: dict[str, Mutation] = {
     "far_links_weightless": Mutation(
         "inner links of the rigid chain carry half of the weight that they have with those beyond",
         "warp_mca/rigid/plain_chain.py",
-        "needed = [wx * gy - wy * gx for wx, wy in w]",
-        "needed = [(0.5 if i + 1 < count else 1.0) * (wx * gy - wy * gx) for i, (wx, wy) in enumerate(w)]",
+        "f0 = -((b0 * k0 - a0 * s0) * gy - (-a0 * k0 - b0 * s0) * gx",
+        "f0 = -(0.5 * (b0 * k0 - a0 * s0) * gy - 0.5 * (-a0 * k0 - b0 * s0) * gx",
     ),
     "pressure_varies_within_elements": Mutation(
         "each integration point adds a tenth of its own pressure to that of the element",

@@ -139,7 +139,7 @@ class Helpers:
         count: int,
         told: Callable[[int, T], None],
     ) -> dict[int, T]:
-        self._begin(count)
+        self.begin(count)
         left, answers = deque(range(jobs)), {}
         busy: dict[_Helper, int | None] = {helper: None for helper in self._all if not helper.begun}
         for helper in [helper for helper in self._all if helper.begun]:
@@ -165,7 +165,8 @@ class Helpers:
                     told(k, answers[k])
         return answers
 
-    def _begin(self, count: int) -> None:
+    def begin(self, count: int) -> None:
+        """Start so many, unless they are there; nobody waits for them."""
         if self._where != _surroundings():
             self.end()
         self._where = _surroundings()

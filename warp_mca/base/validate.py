@@ -13,9 +13,11 @@ import zipfile
 import zlib
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import lru_cache
 from itertools import pairwise
 from numbers import Integral, Real
 from pathlib import Path
+from types import NoneType
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -45,6 +47,7 @@ DAMAGE = (
 
 SHORTEST, LONGEST = 1e-15, 1e9  # times that users may give [s]
 TIME = f"give a finite time from {SHORTEST:g} to {LONGEST:g} s"
+_PLAIN = frozenset((float, str, bool, NoneType))
 MAX_COUNT = 1_000_000_000  # upper limit of every count that users give; memory runs out before
 
 
@@ -54,16 +57,25 @@ def plain(item: Any) -> None:
     NumPy arrays, lists and fractions then compare, hash and print like the numbers that they stand for. A number stays
     an int only in a field whose annotation says int. All other values stay as they are, for the checks that follow.
     """
-    for field in dataclasses.fields(item):
-        whole = re.search(r"\bint\b", str(field.type)) is not None
-        value = getattr(item, field.name)
+    for name, whole in _fields(type(item)):
+        value = getattr(item, name)
+        if type(value) in _PLAIN:
+            continue
         value = value.tolist() if isinstance(value, np.ndarray) else value
         if _is_sequence(value):
             value = tuple(_plain_number(entry, whole) for entry in value)
-        object.__setattr__(item, field.name, _plain_number(value, whole))
+        object.__setattr__(item, name, _plain_number(value, whole))
+
+
+@lru_cache(maxsize=1024)
+def _fields(kind: type) -> tuple[tuple[str, bool], ...]:
+    """Fields of a dataclass, and whether the annotation of each says int."""
+    return tuple((field.name, re.search(r"\bint\b", str(field.type)) is not None) for field in dataclasses.fields(kind))
 
 
 def _plain_number(value: object, whole: bool) -> object:
+    if type(value) in _PLAIN:
+        return value
     if isinstance(value, np.bool_):
         return bool(value)
     if isinstance(value, Real) and not isinstance(value, bool):
@@ -230,6 +242,8 @@ def call(field: str, value: object, what: str, function: Callable[..., Any], *ar
 
 def is_number(value: object) -> bool:
     """Whether it is a finite real number; text, None, sequences and booleans are not."""
+    if type(value) is float:  # most are, and asking an abstract class takes long
+        return math.isfinite(value)
     try:
         return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
     except OverflowError:  # a whole number that no float holds
@@ -249,6 +263,8 @@ def is_list(value: object) -> bool:
 
 
 def _is_sequence(value: object) -> TypeGuard[Sequence[object]]:
+    if type(value) is tuple:
+        return True
     return isinstance(value, Sequence) and not isinstance(value, str | bytes | bytearray | memoryview)
 
 

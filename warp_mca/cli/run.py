@@ -20,6 +20,8 @@ from warp_mca.cli.request import Request, read_request
 from warp_mca.cli.resume import command_of
 from warp_mca.cli.warp_start import start_warp
 from warp_mca.phases.every import DEFAULT, Every
+from warp_mca.results.drawing import begin_helpers
+from warp_mca.system.threads import thread_count
 
 if TYPE_CHECKING:
     from warp_mca.recorders import Recorder
@@ -51,7 +53,7 @@ def run(args: argparse.Namespace) -> None:
     request = read_request(args)
     out = args.out or Path(request.label if args.method == "mca" else f"{request.label}-{args.method}")
     recorders = recorders_of(args, out)
-    start_warp(*_needed(args, request))
+    start_warp(*_needed(args))
     with _noting_what_is_left(args), nullcontext() if args.quiet else progress_bar() as progress:
         result = mca.run(
             request.scene,
@@ -77,10 +79,10 @@ def run(args: argparse.Namespace) -> None:
         raise CriterionError("; ".join(failed))
 
 
-def _needed(args: argparse.Namespace, request: Request) -> list[str]:
-    """Modules that the run will use, which take long to import."""
-    swings = ["scipy.integrate"] if request.scene.rigid else []
-    return [*swings, *(["matplotlib.backends.backend_agg"] if args.figures == "png" else [])]
+def _needed(args: argparse.Namespace) -> list[str]:
+    """Modules that the run will use, which take long to import, unless helpers are begun for its figures."""
+    drawn_here = args.figures == "png" and not begin_helpers(thread_count(None))
+    return ["matplotlib.backends.backend_agg"] if drawn_here else []
 
 
 def _tell(args: argparse.Namespace, request: Request, result: Result, out: Path, recorders: Sequence[Recorder]) -> None:

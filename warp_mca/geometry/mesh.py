@@ -111,9 +111,23 @@ class Mesh:
         """
         state, found, seen = vars(self).get("_known", (None, {}, None))
         if seen is None or seen is not this_run():
-            now = tuple(hash(values.tobytes()) for values in (self.points, *self.cells.values()))
+            now = self._as_it_is()
             vars(self)["_known"] = now, (found := found if now == state else {}), this_run()
         return found
+
+    def _as_it_is(self) -> tuple[int, ...]:
+        """What tells nodes and cells from others, in this process."""
+        return tuple(hash(values.tobytes()) for values in (self.points, *self.cells.values()))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For another process, with what is known of nodes and cells as they are now."""
+        return vars(self) | ({"_known": self.known} if "_known" in vars(self) else {})
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Keep what was known there."""
+        vars(self).update(state)
+        if "_known" in state:
+            vars(self)["_known"] = self._as_it_is(), state["_known"], None
 
     def look_again(self) -> None:
         """Compare nodes and cells at the next look, in a run too: code of the user's own had the mesh."""

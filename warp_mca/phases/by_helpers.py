@@ -24,6 +24,7 @@ from warp_mca.watch.table import told_at_the_end
 MOST_CELLS = 200_000  # of a scene for a helper: larger ones fill memory, and a batch has few of them
 STARTING = 3.0  # least work left for which helpers are started; they take a second to begin [s]
 SENDING = 0.3  # the same where they are there [s]
+MANY = 64  # scenes whose work is more than that, so that helpers begin with the first
 HELPERS = Helpers(__name__)
 
 Wall = dict[str, float]  # seconds by stage
@@ -43,6 +44,8 @@ def prepared(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | Non
     """
     made: dict[object, Mesh] = {}
     ready: list[Prepared] = []
+    if len(scenes) >= MANY and _may_help(request.settings, meshes):
+        HELPERS.begin(request.settings.threads)
 
     def here(k: int) -> Prepared:
         own = replace(request, tell=lambda stage, _: request.tell(stage, k / len(scenes)))
@@ -63,10 +66,15 @@ def prepared(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | Non
 
 def _worth_it(ready: Sequence[Prepared], left: float, settings: Settings, meshes: object) -> bool:
     """Whether helpers end sooner with work that takes this process so long [s]."""
-    if settings.threads < 3 or meshes is not None or registered():
+    if not _may_help(settings, meshes):
         return False
     small = all(sum(item.cell_count for item in own.meshes.values()) <= MOST_CELLS for own in ready)
     return small and left > (SENDING if HELPERS.count >= settings.threads else STARTING)
+
+
+def _may_help(settings: Settings, meshes: object) -> bool:
+    """Whether there are cores for helpers, and they know all that a run may have."""
+    return settings.threads > 2 and meshes is None and not registered()
 
 
 def _by_helpers(

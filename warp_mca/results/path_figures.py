@@ -136,12 +136,14 @@ def _draw_speeds(axes: Axes, path: PathHistory, speeds: Mapping[str, float]) -> 
         line.set_path_effects([Stroke(linewidth=2.4, foreground="black"), Normal()])
 
 
-def save_path_figures(directory: str | os.PathLike[str], result: Result) -> list[Path]:
-    """Write paths.png and waves.png into `directory` as PNG at 200 dots per inch."""
-    folder = Path(directory)
+def save_path_curves(path: str | os.PathLike[str], result: Result) -> Path:
+    """Write paths.png to `path` as PNG at 200 dots per inch."""
+    headings = result.summary.get("path_headings", {})
+    return save_png(plot_paths(result.time, result.paths, headings=headings), path)
+
+
+def save_waves(path: str | os.PathLike[str], result: Result) -> Path:
+    """Write waves.png to `path` as PNG at 200 dots per inch."""
     headings = result.summary.get("path_headings", {})
     speeds = {WAVES[key]: float(value) for key, value in result.summary.get("wave_speeds", {}).items()}
-    return [
-        save_png(plot_paths(result.time, result.paths, headings=headings), folder / "paths.png"),
-        save_png(plot_waves(result.time, result.paths, speeds, headings), folder / "waves.png"),
-    ]
+    return save_png(plot_waves(result.time, result.paths, speeds, headings), path)

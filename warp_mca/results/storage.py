@@ -20,6 +20,7 @@ from warp_mca.base.folder import Folder, held
 from warp_mca.base.validate import DAMAGE
 from warp_mca.results.contact_history import load_contacts, save_contacts
 from warp_mca.results.csv_table import write_table
+from warp_mca.results.drawing import draw_figures
 from warp_mca.results.force_history import Array
 from warp_mca.results.html_page import Image
 from warp_mca.results.paths import load_paths, save_paths
@@ -110,7 +111,7 @@ def write(
             begun = time.perf_counter()
             _write_data(result, written)
             if figures:
-                _draw_figures(result, written)
+                draw_figures(result, written)
             text = report_html(result, written, images() if figures else ())
             (written / REPORT).write_text(text, encoding="utf-8")
             digests = {file.name: _digest(file) for file in sorted(written.iterdir())}
@@ -133,22 +134,6 @@ def _write_data(result: Result, folder: Path) -> None:
         save_paths(folder / "paths.npz", result.time, result.paths)
     if result.probes or result.sections:
         save_sensors(folder, result.time, result.probes, result.sections)
-
-
-def _draw_figures(result: Result, folder: Path) -> None:
-    """Draw forces, energies, and what there is besides."""
-    from warp_mca.results.energy_figure import save_energies
-    from warp_mca.results.force_figure import save_forces
-    from warp_mca.results.path_figures import save_path_figures
-    from warp_mca.results.probe_figure import save_probes
-
-    shown = result.impact() if result.summary.get("touched", True) else result  # of many, the first one
-    save_forces(folder / "forces.png", shown)
-    save_energies(folder / "energies.png", result)
-    if result.paths:
-        save_path_figures(folder, shown)
-    if result.probes or result.sections:
-        save_probes(folder / "probes.png", shown)
 
 
 def _digest(file: Path) -> str:

@@ -18,18 +18,13 @@ With a base that slides along e by s, s comes in front of the angles; m is the m
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warp_mca.base.errors import bad_value
+from warp_mca.rigid.link import Array, Link, Vec2
 from warp_mca.rigid.loads import Loads
-
-Vec2 = tuple[float, float]
-Array = NDArray[np.float64]
 
 
 def perpendicular(vectors: Array) -> Array:
@@ -41,78 +36,6 @@ def link_axes(theta: Array) -> tuple[Array, Array]:
     """World directions d, f of the links' x and y axes [-], each shape (..., 2), float64, for theta (...,) [rad]."""
     sine, cosine = np.sin(theta), np.cos(theta)
     return np.stack([-sine, -cosine], axis=-1), np.stack([cosine, -sine], axis=-1)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Link:
-    """One rigid link. Its frame is the body's frame, shifted to the inbound hinge.
-
-    Attributes:
-        body: name of the body that it stands for.
-        mass: [kg].
-        centre: of mass, in the link's frame [m].
-        inertia: about the centre of mass and the z axis [kg m^2].
-        hinge_out: the next link's hinge in this link's frame [m]; of no account on the last link.
-        hinge_in: the inbound hinge in the body's frame [m].
-    """
-
-    body: str
-    mass: float
-    centre: Vec2
-    inertia: float
-    hinge_out: Vec2 = (0.0, 0.0)
-    hinge_in: Vec2 = (0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        if not (math.isfinite(self.mass) and self.mass > 0.0):
-            raise bad_value(f"mass of link {self.body}", self.mass, "give a finite number of kg above 0")
-        if not (math.isfinite(self.inertia) and self.inertia >= 0.0):
-            raise bad_value(f"inertia of link {self.body}", self.inertia, "give a finite number of kg m^2, 0 or above")
-
-
-def slender_link(
-    body: str, end: Vec2, *, mass: float, hinge_out: Vec2 = (0.0, 0.0), hinge_in: Vec2 = (0.0, 0.0)
-) -> Link:
-    """A uniform slender rod from the inbound hinge to `end` [m] in the link's frame; inertia m l^2 / 12 (Eq. 3)."""
-    inertia = mass * (end[0] ** 2 + end[1] ** 2) / 12.0
-    centre = (0.5 * end[0], 0.5 * end[1])
-    return Link(body=body, mass=mass, centre=centre, inertia=inertia, hinge_out=hinge_out, hinge_in=hinge_in)
-
-
-def mesh_link(
-    body: str, points: Array, masses: Array, *, hinge_out: Vec2 = (0.0, 0.0), hinge_in: Vec2 = (0.0, 0.0)
-) -> Link:
-    """A link with the planar mass, centre and inertia of lumped nodal masses.
-
-    These sums are what the finite-element model will carry, so a rigid motion keeps momentum, angular momentum and
-    kinetic energy to round-off when it is handed over.
-
-    Args:
-        body: its name.
-        points: node positions in the body's frame [m], shape (node_count, 3), float64.
-        masses: lumped nodal masses [kg], shape (node_count,), float64.
-        hinge_out: the next hinge in the link's frame [m].
-        hinge_in: the inbound hinge in the body's frame [m].
-
-    Raises:
-        RequestError: one mass for each node is not given.
-    """
-    if masses.shape != (len(points),):
-        raise bad_value(
-            f"shape of the nodal masses of {body}", masses.shape, f"give one for each of {len(points)} nodes"
-        )
-    arms = points[:, :2] - np.asarray(hinge_in)
-    mass = masses.sum()
-    centre = masses @ arms / mass
-    inertia = masses @ ((arms - centre) ** 2).sum(axis=1)
-    return Link(
-        body=body,
-        mass=float(mass),
-        centre=(float(centre[0]), float(centre[1])),
-        inertia=float(inertia),
-        hinge_out=hinge_out,
-        hinge_in=hinge_in,
-    )
 
 
 @dataclass(frozen=True)
@@ -193,15 +116,20 @@ class Chain:
 
     def mass_matrix(self, theta: Array) -> Array:
         """M(theta) [kg m^2], shape (coordinate_count, coordinate_count), float64; [kg m] and [kg] for s."""
+        return self._mass_matrices(theta[None])[0]
+
+    def _mass_matrices(self, theta: Array) -> Array:
+        """Mass matrices of states, shape (count, coordinate_count, coordinate_count)."""
         theta = self.angles(theta)
         first, second = self.moments
         w = self._turn(theta, first)
-        upper = np.triu(self._turn(theta, self._hinge_out) @ w.T, 1)
-        links = upper + upper.T + np.diag(second)
+        upper = np.triu(self._turn(theta, self._hinge_out) @ w.swapaxes(1, 2), 1)
+        links = upper + upper.swapaxes(1, 2) + np.diag(second)
         if self.slide is None:
             return links
-        coupling = -perpendicular(w) @ np.asarray(self.slide)
-        return np.block([[np.array([[self.mass]]), coupling[None]], [coupling[:, None], links]])
+        coupling = (-perpendicular(w) @ np.asarray(self.slide))[:, None]
+        top = np.concatenate([np.full((len(w), 1, 1), self.mass), coupling], axis=2)
+        return np.concatenate([top, np.concatenate([coupling.swapaxes(1, 2), links], axis=2)], axis=1)
 
     def rate_force(self, theta: Array, theta_dot: Array) -> Array:
         """C(theta, theta_dot) [N m], shape (coordinate_count,), float64; [N] for s."""
@@ -229,16 +157,30 @@ class Chain:
 
     def kinetic_energy(self, theta: Array, theta_dot: Array) -> float:
         """T = theta' . M theta' / 2 [J], and v . p + m v^2 / 2 for a base that moves at v, p the momentum at v = 0."""
-        relative = float(0.5 * theta_dot @ self.mass_matrix(theta) @ theta_dot)
+        relative = float(self.kinetic_energies(theta[None], theta_dot[None])[0])
         if not any(self.origin_velocity):
             return relative
         v = np.asarray(self.origin_velocity)
         return relative + float(v @ self._momentum(theta, theta_dot, self.mass)) - 0.5 * self.mass * float(v @ v)
 
+    def kinetic_energies(self, theta: Array, theta_dot: Array) -> Array:
+        """`kinetic_energy` of states of a chain whose base rests [J], shape (count,), float64.
+
+        Args:
+            theta, theta_dot: of each state, shape (count, coordinate_count).
+        """
+        return (0.5 * theta_dot[:, None] @ self._mass_matrices(theta) @ theta_dot[:, :, None])[:, 0, 0]
+
+    def potential_energies(self, theta: Array) -> Array:
+        """`potential_energy` of states [J], shape (count,), float64, for theta (count, coordinate_count)."""
+        fixed = -self._turn(self.angles(theta), self.moments[0]).sum(axis=1) @ np.asarray(self.gravity)
+        return (
+            fixed if self.slide is None else fixed - self.mass * theta[:, 0] * float(np.dot(self.gravity, self.slide))
+        )
+
     def potential_energy(self, theta: Array) -> float:
         """V = -g . (first moment of the chain about the ground hinge at s = 0) [J]."""
-        fixed = float(-self._turn(self.angles(theta), self.moments[0]).sum(axis=0) @ np.asarray(self.gravity))
-        return fixed if self.slide is None else fixed - self.mass * theta[0] * float(np.dot(self.gravity, self.slide))
+        return float(self.potential_energies(theta[None])[0])
 
     def hinges(self, theta: Array, theta_dot: Array) -> tuple[Array, Array]:
         """World positions [m] and velocities [m/s] of the inbound hinges, each shape (link_count, 2), float64.

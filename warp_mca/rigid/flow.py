@@ -11,13 +11,13 @@ import numpy as np
 from warp_mca.base.errors import bad_value
 from warp_mca.rigid.chain import Array, Chain
 from warp_mca.rigid.loads import Loads, joint_rates, link_torques
-from warp_mca.rigid.plain_chain import acceleration_of
+from warp_mca.rigid.plain_chain import acceleration_of, free_slopes
 
 MAX_TURN = 1e4  # angle through which a chain may turn in a swing [rad]; it takes minutes to compute
 MAX_DECAYS = 1e6  # decay times of joint friction at rest in a swing; it takes minutes to compute
 
 
-def flow(chain: Chain, middle: float) -> Callable[[float, Array], Array]:
+def flow(chain: Chain, middle: float) -> Callable[[float, Array], Array | list[float]]:
     """y' = f(t, y) between two corners of the tables, around the time `middle` [s].
 
     y holds coordinates and rates, and where there are loads the work of torques, the heat of friction and the work of
@@ -25,8 +25,7 @@ def flow(chain: Chain, middle: float) -> Callable[[float, Array], Array]:
     """
     count, loads = chain.coordinate_count, chain.loads
     if loads is None:
-        free = acceleration_of(chain)
-        return lambda _t, y: np.concatenate([y[count:], free(y[:count], y[count:], None)])
+        return free_slopes(chain)
     base, local = loads.base_velocity, replace(chain, origin_velocity=(0.0, 0.0))
     if base is not None:
         a = base.slope(middle)

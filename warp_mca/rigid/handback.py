@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from warp_mca.base.rotation import mean_pose, point_velocity
 from warp_mca.rigid.body_motion import Fit, body_motion
-from warp_mca.rigid.chain import Array, Chain, Vec2, link_axes, mesh_link, perpendicular
+from warp_mca.rigid.chain import Array, Chain, Vec2, link_axes, perpendicular
+from warp_mca.rigid.link import mesh_link
 from warp_mca.rigid.placement import Placement, link_placements
 from warp_mca.scene.ties import Pin
 

@@ -11,7 +11,8 @@ import numpy as np
 from warp_mca.base.errors import bad_value
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.rigid.chain import Array, Chain, Link, Vec2, mesh_link, slender_link
+from warp_mca.rigid.chain import Array, Chain, Vec2
+from warp_mca.rigid.link import Link, mesh_link, slender_link
 from warp_mca.rigid.loads import Loads, Table
 from warp_mca.scene import Revolute, RigidPhase, Scene, Tip, Vec3
 from warp_mca.scene.ties import Pin

@@ -5,19 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from warp_mca.base.errors import bad_value
 from warp_mca.rigid.chain import Array, Chain
+from warp_mca.rigid.dop853 import Dop853
 from warp_mca.rigid.flow import flow, own_pace, round_off
 from warp_mca.rigid.loads import Loads
 from warp_mca.rigid.touch import Gap, Watch
-
-if TYPE_CHECKING:
-    from scipy.integrate import OdeSolution
+from warp_mca.rigid.trace import Ends, Trace
 
 MAX_TURN_PER_STEP = 0.05  # of the chain's own time scale, so that the gap has at most one minimum in a step
 SAMPLE_COUNT = 257  # of the trajectory kept for plotting
@@ -58,7 +57,14 @@ class Swing:
 
 
 def swing(
-    chain: Chain, theta0: ArrayLike, theta_dot0: ArrayLike, gap: Gap, t_max: float, *, t_end: float | None = None
+    chain: Chain,
+    theta0: ArrayLike,
+    theta_dot0: ArrayLike,
+    gap: Gap,
+    t_max: float,
+    *,
+    t_end: float | None = None,
+    kept: bool = True,
 ) -> Swing:
     """Swing the chain from its release at t = 0 until the gap to the target closes.
 
@@ -69,6 +75,7 @@ def swing(
         gap: distance of the tip from the target [m], a function of time [s] and coordinates.
         t_max: give up then [s].
         t_end: end then in place of t_max, touch or not [s].
+        kept: as in `swing_until`.
 
     Raises:
         RequestError: the tip overlaps the target at the start, or does not reach it by t_max.
@@ -79,7 +86,7 @@ def swing(
     if start < -round_off(chain):
         remedy = f"the tip overlaps the target at the start by {-start:.6g} m; move the target away or change"
         raise bad_value("gap to RigidPhase.target at t = 0 [m]", float(start), f"{remedy} RigidPhase.theta, in radians")
-    run = swing_until(chain, theta0, theta_dot0, (gap,), t_end=t_max if t_end is None else t_end)
+    run = swing_until(chain, theta0, theta_dot0, (gap,), t_end=t_max if t_end is None else t_end, kept=kept)
     if run.ended_by == "touch" or t_end is not None:
         return run
     value, t = run.closest
@@ -100,6 +107,7 @@ def swing_until(
     *,
     t_start: float = 0.0,
     t_end: float,
+    kept: bool = True,
 ) -> Swing:
     """Integrate the chain from any state until one of the gaps closes, or to t_end.
 
@@ -116,6 +124,7 @@ def swing_until(
         gaps: distances to what may be touched [m], functions of time from release [s] and coordinates.
         t_start: time from release at which to begin [s].
         t_end: time from release at which to end at the latest [s].
+        kept: whether the trajectory is wanted; else its samples are its start and its end, which takes half the time.
 
     Raises:
         RequestError: the state does not fit the chain or is not finite, the time is too long for the chain's pace, or
@@ -126,14 +135,14 @@ def swing_until(
     watches = [Watch(gap, chain.coordinate_count, t_start, y, round_off(chain)) for gap in gaps]
     if chain.loads is not None:
         y = np.concatenate([y, np.zeros(3)])
-    times, pieces = [t_start], []
+    trace = Trace(t_start, y) if kept else Ends(t_start, y)
     touch = next(((t_start, k) for k, watch in enumerate(watches) if watch.touching), None)
     for until in _stops(chain.loads, t_start, t_end) if touch is None else []:
-        y, touch = _advance(chain, watches, (times, pieces), y, until, pace)
+        y, touch = _advance(chain, watches, trace, y, until, pace)
         if touch is not None:
             break
-    closest = min((watch.closest for watch in watches), default=(math.inf, times[-1]))
-    return _record(chain, times, pieces, y, touch, closest)
+    closest = min((watch.closest for watch in watches), default=(math.inf, trace.t))
+    return _record(chain, trace, y, touch, closest)
 
 
 def _state(chain: Chain, theta: ArrayLike, theta_dot: ArrayLike) -> Array:
@@ -151,9 +160,9 @@ def _stops(loads: Loads | None, t_start: float, t_end: float) -> list[float]:
 
 
 def _advance(
-    chain: Chain, watches: list[Watch], trace: tuple[list, list], y: Array, until: float, pace: float
+    chain: Chain, watches: list[Watch], trace: Trace, y: Array, until: float, pace: float
 ) -> tuple[Array, tuple[float, int] | None]:
-    """Integrate to the time `until` [s] or the first touch; `trace` gets the ends and the dense output of each step.
+    """Integrate to the time `until` [s] or the first touch; `trace` gets each step.
 
     Returns:
         The state at the end, and time [s] and index of the gap that closed, or None.
@@ -161,57 +170,40 @@ def _advance(
     Raises:
         RequestError: the integration breaks off.
     """
-    from scipy.integrate import DOP853  # whose import takes a tenth of a second
-
-    times, pieces = trace
-    start = times[-1]
+    start = trace.t
     longest = min(until - start, MAX_TURN_PER_STEP / pace) if pace > 0.0 else until - start
-    solver = DOP853(flow(chain, 0.5 * (start + until)), start, y, until, max_step=longest, rtol=1e-12, atol=1e-14)
-    while solver.status == "running":
-        message = solver.step()
-        if solver.status == "failed":
+    slopes = flow(chain, 0.5 * (start + until))
+    steps = Dop853(slopes, start, y, until, longest=longest, rtol=1e-12, atol=1e-14)
+    while not steps.done:
+        if message := steps.step():
             rates = tuple(float(v) for v in y[chain.coordinate_count : 2 * chain.coordinate_count])
             raise bad_value("RigidPhase.theta_dot", rates, f"the swing broke off: {message}")
-        path = solver.dense_output()
-        pieces.append(path)
-        found = [(watch.advance(path, solver.t, solver.y), k) for k, watch in enumerate(watches)]
+        path = trace.path_of(steps)
+        found = [(watch.advance(path, steps.t, steps.y), k) for k, watch in enumerate(watches)]
         touch = min(((t, k) for t, k in found if t is not None), default=None)
         if touch is None:
-            times.append(solver.t)
+            trace.end_at(steps.t)
             continue
-        if touch[0] > times[-1]:
-            times.append(touch[0])
-        else:  # it closes where the step begins
-            pieces.pop()
+        trace.end_at(touch[0])
         return path(touch[0]), touch
-    return solver.y, None
+    return steps.y, None
 
 
 def _record(
-    chain: Chain,
-    times: list[float],
-    pieces: list,
-    end: Array,
-    touch: tuple[float, int] | None,
-    closest: tuple[float, float],
+    chain: Chain, trace: Trace, end: Array, touch: tuple[float, int] | None, closest: tuple[float, float]
 ) -> Swing:
     """The swing, with its energy checked at the integrator's own steps."""
-    from scipy.integrate import OdeSolution
-
-    count, t_end = chain.coordinate_count, times[-1]
-    path: OdeSolution | None = OdeSolution(times, pieces) if pieces else None
-    steps = np.array(times) if path is not None else np.array([t_end])
-    t = np.linspace(times[0], t_end, SAMPLE_COUNT if path is not None else 1)
-    states = end[None] if path is None else path(steps).T
-    samples = end[None] if path is None else path(t).T
-    kinetic, total = _energies(chain, steps, states)
+    count = chain.coordinate_count
+    times, at_steps = trace.met(end)
+    t, samples = trace.sampled(end, SAMPLE_COUNT)
+    kinetic, total = _energies(chain, times, at_steps)
     scale = kinetic.max()
     return Swing(
         ended_by="t_end" if touch is None else "touch",
         touched=None if touch is None else touch[1],
-        t_end=t_end,
-        theta=states[-1, :count],
-        theta_dot=states[-1, count : 2 * count],
+        t_end=trace.t,
+        theta=at_steps[-1, :count],
+        theta_dot=at_steps[-1, count : 2 * count],
         energy_drift=float(np.abs(total - total[0]).max() / scale) if scale > 0.0 else 0.0,
         t=t,
         theta_t=samples[:, :count],
@@ -224,10 +216,13 @@ def _record(
 def _energies(chain: Chain, times: Array, states: Array) -> tuple[Array, Array]:
     """Kinetic energy, and energy with heat added and work put in taken off [J], each shape (count,), float64."""
     count = chain.coordinate_count
+    q, v = states[:, :count], states[:, count : 2 * count]
+    potential = chain.potential_energies(q)
+    if chain.loads is None:
+        kinetic = chain.kinetic_energies(q, v)
+        return kinetic, kinetic + potential
     placed = [chain.moved_to(t) for t in times]
-    kinetic = np.array([p.kinetic_energy(y[:count], y[count : 2 * count]) for p, y in zip(placed, states, strict=True)])
-    total = kinetic + np.array([chain.potential_energy(y[:count]) for y in states])
-    if chain.loads is not None:
-        shift = np.array([p.origin for p in placed]) - np.asarray(chain.origin)
-        total = total - chain.mass * shift @ np.asarray(chain.gravity) + states[:, 2 * count :] @ [-1.0, 1.0, -1.0]
-    return kinetic, total
+    kinetic = np.array([p.kinetic_energy(*state) for p, *state in zip(placed, q, v, strict=True)])
+    shift = np.array([p.origin for p in placed]) - np.asarray(chain.origin)
+    work = states[:, 2 * count :] @ [-1.0, 1.0, -1.0]
+    return kinetic, kinetic + potential - chain.mass * shift @ np.asarray(chain.gravity) + work

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from warp_mca.rigid.brent import brent_root
 from warp_mca.rigid.chain import Array
 
 Gap = Callable[[float, Array], float]
 
 PROBE = 1e-6  # time by which the rate of a gap is estimated [s]
-ROOT = 4.0 * 2.0**-52  # accuracy of times, absolute [s] and relative [-], that scipy's solve_ivp takes for its events
+ROOT = 4.0 * 2.0**-52  # accuracy of times, absolute [s] and relative [-], as SciPy's solve_ivp has it
 
 
 class Watch:
@@ -89,9 +90,7 @@ class Watch:
 
 def _root(value: Callable[[float], float], low: float, high: float) -> float:
     """Where a value changes its sign between two times [s]; the end nearer to 0 if round-off hides the change."""
-    from scipy.optimize import brentq
-
     ends = value(low), value(high)
     if ends[0] * ends[1] > 0.0:
         return low if abs(ends[0]) < abs(ends[1]) else high
-    return float(brentq(value, low, high, xtol=ROOT, rtol=ROOT))  # pyright: ignore
+    return brent_root(value, low, high, ends, ROOT)

@@ -102,7 +102,8 @@ SPAN = 0.4  # of its motion [s]
 
 def rigid_pendulum(meshes: dict[str, Mesh], masses: dict[str, Array]) -> tuple[Array, Array, float]:
     """Displacement of tip and of hinge A [m], each shape (2,), float64, and kinetic energy [J] after SPAN."""
-    from warp_mca.rigid.chain import Chain, mesh_link
+    from warp_mca.rigid.chain import Chain
+    from warp_mca.rigid.link import mesh_link
     from warp_mca.rigid.swing import swing
 
     links = [mesh_link(name, meshes[name].points, masses[name], hinge_out=(LENGTH, 0.0)) for name in ("OA", "AB")]

@@ -21,7 +21,8 @@ ROUND_OFF = 1e-12
 
 def slender_chain(count: int, gravity: float) -> Chain:
     """Equal slender rods of 0.21 m and 0.3 kg under `gravity` [m/s^2]."""
-    from warp_mca.rigid.chain import Chain, slender_link
+    from warp_mca.rigid.chain import Chain
+    from warp_mca.rigid.link import slender_link
 
     length = 0.21
     links = tuple(slender_link(f"link{k}", (length, 0.0), mass=0.3, hinge_out=(length, 0.0)) for k in range(count))
@@ -30,7 +31,8 @@ def slender_chain(count: int, gravity: float) -> Chain:
 
 def crooked_chain(count: int, gravity: float) -> Chain:
     """Links of different mass and length, with centres and hinges off their axes, under `gravity` [m/s^2]."""
-    from warp_mca.rigid.chain import Chain, Link
+    from warp_mca.rigid.chain import Chain
+    from warp_mca.rigid.link import Link
 
     links = tuple(
         Link(
