@@ -122,7 +122,9 @@ class Contact(_Springs):
         friction: law that changes the limit mu F_n of the friction force, or several that do in turn, as
             (DecayingFriction(kinetic=0.2, decay=2.0), ShearCap(tau_max=1e8)); Coulomb's limit by default.
         two_way: whether the master's nodes are also kept out of the slave's faces. None does so where the slave's faces
-            are more than 1.5 times as wide as the master's, and between bodies of rubber or foam.
+            are more than 1.5 times as wide as the master's, between bodies of rubber or foam, where a soft flat slave
+            ends at the border of a stiffer master, and where the master's nearest node is on a corner or an edge that
+            points at a face of the slave.
         initial_overlap: what to do where bodies overlap before the first step: "refuse" the scene; start "stress_free",
             with springs that count depth from there; or "press" them apart, as a press fit: springs come to their full
             force while waves cross the longer body six times. They begin with it where that bears no more than weight.

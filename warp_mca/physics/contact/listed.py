@@ -12,8 +12,8 @@ from warp_mca.base.arrays import Array, Index
 from warp_mca.geometry.exposure import Exposure
 from warp_mca.physics.contact.auto_penalty import settled
 from warp_mca.physics.contact.bonds import Place, bonded
+from warp_mca.physics.contact.both_sides import bulges_over, pokes
 from warp_mca.physics.contact.eigenvalues import contact_eigenvalues
-from warp_mca.physics.contact.flush import bulges_over
 from warp_mca.physics.contact.resting import resting
 from warp_mca.physics.contact.skin_edges import edge_eigenvalues, edge_pass, is_two_way, no_edges
 from warp_mca.physics.contact.stiffness import Inertia
@@ -38,18 +38,18 @@ def as_settled(
     parts: Bodies, contact: Contact, slave: Faces, master: Faces | None, velocity: Array, flat: bool | None = None
 ) -> tuple[Contact, ChosenPenalty | None]:
     """A contact with all that is left to the program, and the penalty that was chosen; `flat` as in `passes_of`."""
-    soft = (
-        contact.two_way is None
-        and master is not None
-        and (_soft(parts, contact) or _bulges(parts, contact, slave, master))
-    )
-    contact = replace(contact, two_way=is_two_way(contact, slave, master, soft))
+    both = contact.two_way is None and master is not None and _needs_both(parts, contact, slave, master)
+    contact = replace(contact, two_way=is_two_way(contact, slave, master, both))
     contact, chosen = settled(parts, contact, slave, master, velocity)
     return resting(parts, contact, slave, master, velocity, flat), chosen
 
 
 def _soft(parts: Bodies, contact: Contact) -> bool:
-    """Whether both bodies are flexible, and of materials for large strain only."""
+    """Whether both bodies are flexible, and of materials for large strain only, as rubber.
+
+    A node that presses with F beside a corner of faces of size h that stands out by w falls off it, as F w / h grows
+    faster than what elements hold it by, from a pressure of some 0.2 E on; nodes of both sides bear half of F each.
+    """
     bodies = [parts.scene.body(name) for name in contact.sides]
     if any(body.rigid for body in bodies):
         return False
@@ -57,8 +57,10 @@ def _soft(parts: Bodies, contact: Contact) -> bool:
     return all(item.finite_only for item in materials)
 
 
-def _bulges(parts: Bodies, contact: Contact, slave: Faces, master: Faces) -> bool:
-    """`flush.bulges_over` of bodies as they are, rigid ones among them."""
+def _needs_both(parts: Bodies, contact: Contact, slave: Faces, master: Faces) -> bool:
+    """Whether nodes of the master have to be kept out of the slave's faces, too, however wide these are."""
+    if _soft(parts, contact) or pokes(parts.X, slave, master):
+        return True
     modulus = np.where(parts.rigid, np.inf, 4.0 * parts.G * (3.0 * parts.K + parts.G) / (3.0 * parts.K + 4.0 * parts.G))
     return bulges_over(contact, parts.X, modulus, slave, master)
 

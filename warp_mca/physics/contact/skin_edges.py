@@ -61,17 +61,15 @@ def skin_edges(X: Array, faces: Faces) -> SkinEdges:
     return SkinEdges(node, face, length, np.sqrt(area), radius)
 
 
-def is_two_way(contact: Contact, slave: Faces, master: Faces | None, soft: bool = False) -> bool:
+def is_two_way(contact: Contact, slave: Faces, master: Faces | None, both: bool = False) -> bool:
     """Whether the master's nodes are kept out of the slave's faces, too: as the contact says, or if these are wider.
 
     They are so on most of the surfaces, and where these are nearest to each other: faces far from contact may be of any
-    size. It is so also where both are `soft`, of rubber. A node that presses with F beside a corner of faces of size h
-    that stands out by w falls off it, as F w / h grows faster than what elements hold it by, from a pressure of some
-    0.2 E on; nodes of both sides bear half of F each.
+    size. It is so also where nodes of `both` are needed for another reason.
     """
     if contact.two_way is not None or contact.bond or master is None:
         return bool(contact.two_way)
-    if soft:
+    if both:
         return True
     mine, its = nearest_faces(contact, slave, master)
     local = math.sqrt(slave.area[mine] / master.area[its])

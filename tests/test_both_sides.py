@@ -1,8 +1,9 @@
-"""Soft blocks pressed between stiff ones of the same width, over whose borders they bulge."""
+"""Faces and corners that nodes of the slave alone do not keep apart, and springs of general contact beside them."""
 
 import numpy as np
 import pytest
 from impacts import prepared
+from scipy.spatial.transform import Rotation
 
 import warp_mca as mca
 
@@ -87,3 +88,36 @@ def test_what_springs_of_general_contact_take_of_a_slow_drive_is_said():
     measured = result.F_n[-5:].mean() / (2.0 * SOFT.E * 0.05 * L**2) - 1.0
     assert measured < -0.3
     assert loss == pytest.approx(measured, abs=0.05)
+
+
+@pytest.mark.parametrize("turn", [(0.6, 0.1, 0.8), (0.0, 0.0, 0.8)])
+def test_a_corner_or_an_edge_of_the_master_does_not_sink_into_a_face_of_the_slave(turn):
+    """No slave node was near, so that there was no force, and no word of it."""
+    cube = mca.Box(size=(L, L, L), divisions=(3, 3, 3), origin=(-0.01, -0.01, -0.01))
+    slab = mca.Box(size=(2 * L, 0.01, 2 * L), divisions=(9, 2, 9), origin=(-L, -0.01, -L))
+    steel = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
+    low = float((Rotation.from_rotvec(turn).as_matrix() @ cube.build().points.T)[1].min())
+    bodies = (
+        mca.Body(name="slab", geometry=slab, material=steel),
+        mca.Body(
+            name="cube",
+            geometry=cube,
+            material=steel,
+            rotation=turn,
+            position=(0.0, 1e-5 - low, 0.0),
+            velocity=(0.0, -8.0, 0.0),
+        ),
+    )
+
+    def impulse(slave: str, master: str, two_way: bool | None = None) -> float:
+        one, other = (mca.Surface(body=name, nodes="boundary") for name in (slave, master))
+        contact = mca.Contact(slave=one, master=other, normal=(0.0, 1.0, 0.0), two_way=two_way)
+        impact = mca.ImpactPhase(duration=3e-5, output_interval=3e-7)
+        result = mca.run(
+            mca.Scene(name="poke", bodies=bodies, contacts=(contact,), impact=impact), figures="none", device="cpu"
+        )
+        return abs(float(np.trapezoid(result.F_n, result.time)))
+
+    both = impulse("cube", "slab", two_way=True)
+    assert impulse("slab", "cube") == pytest.approx(both, rel=1e-3)
+    assert 0.6 < both / impulse("cube", "slab") < 1.1  # springs hold most of the energy

@@ -1,6 +1,8 @@
-"""Owns whether a soft slave ends where a stiffer master does, so that pressed it bulges over the master's border."""
+"""Owns where nodes of the slave alone do not keep it out of the master: soft ends that bulge, corners that poke."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -11,6 +13,8 @@ from warp_mca.scene import Contact
 from warp_mca.system.contact import Faces
 
 SOFTER = 0.5  # of the master's modulus that a slave has at most, which spreads more than the master under a pressure
+POKES = math.cos(math.radians(20.0))  # between the reversed normal of a face and those around a node that pokes it
+AHEAD = 0.02  # of the way to a neighbour, by which it may lie ahead of that node
 NEAR = 0.25  # of the width of the slave's faces, as close to the border of the master
 
 
@@ -58,3 +62,28 @@ def _closest(points: Array, edges: Array) -> float:
     arm = points[np.concatenate(near).astype(int)] - edges[edge, 0]
     share = np.clip((arm * along[edge]).sum(axis=1) / length[edge] ** 2, 0.0, 1.0)
     return float(np.linalg.norm(arm - share[:, None] * along[edge], axis=1).min(initial=np.inf))
+
+
+def pokes(X: Array, slave: Faces, master: Faces) -> bool:
+    """Whether a corner or an edge of the master points at the nearest face of the slave, which has no node there.
+
+    Args:
+        X: positions [m], shape (node_count, 3), float64.
+        slave, master: the surfaces.
+    """
+    from scipy.spatial import KDTree
+
+    nodes = master.nodes
+    _, nearest = KDTree(slave.middle).query(X[nodes])
+    normal = slave.normal[nearest] / slave.area[nearest, None]
+    arm = X[nodes] - slave.middle[nearest]
+    gap = (arm * normal).sum(axis=1)
+    within = np.linalg.norm(arm - gap[:, None] * normal, axis=1) < slave.across[nearest]
+    if not within.any():
+        return False
+    first = int(np.where(within, gap, np.inf).argmin())
+    around = (master.node == nodes[first]).any(axis=1)
+    ways = X[np.unique(master.node[around])] - X[nodes[first]]
+    ahead = -(ways @ normal[first]) > AHEAD * np.linalg.norm(ways, axis=1)
+    facing = -(master.normal[around] @ normal[first]) / master.area[around]
+    return not ahead.any() and float(facing.max()) < POKES
