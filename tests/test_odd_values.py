@@ -213,6 +213,8 @@ def scene_with(item: Any) -> mca.Scene:
             change = {"bodies": (dataclasses.replace(low, geometry=item), up)}
         case mca.Select():
             return scene_with(dataclasses.replace(SOUND[mca.MeshFile], select=(item,)))
+        case mca.Finer():
+            return scene_with(dataclasses.replace(SOUND[mca.Cad], finer=(item,)))
         case mca.MeshFile() | mca.Cad() | mca.Mesh():
             change = {"bodies": (dataclasses.replace(low, geometry=item), up)}
         case mca.Body():

@@ -78,8 +78,7 @@ def drop_test(
             have penalty=10 on the floor. "auto": on an edge, a corner or a round place that yields, the depth that the
             fall crushes over `across`, or a quarter of the size without; a `size` of a body stays. "off": none.
         impact: its phase; None runs for 20 passes of a wave in metal along the diagonal of the parts, in 400 intervals.
-        name: of the scene.
-        more: other fields of `Scene`, as `criteria` and `probes`; places in space are those above the floor.
+        name, more: of the scene, with other fields of it, as `criteria`; places in space are those above the floor.
 
     Returns:
         The scene; its parameters are height, pose and onto.
