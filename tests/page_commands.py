@@ -65,7 +65,7 @@ ADDED = {
     "warp-mca run two_link --set joint_nodes=pin --accuracy": "--accuracy 50% --duration 1e-5 --force",
     "warp-mca run my_scene.py --accuracy": "--accuracy 50% --force",
     "warp-mca run paper.mca": "--duration 1e-5 --force",
-    "warp-mca run bracket.step --height": "--duration 1e-6 --set across=0.5 --force",  # 25 s
+    "warp-mca run bracket.step --height": "--duration 1e-6 --set across=0.5 --set struck=off --force",  # 25 s
     "warp-mca build two_link --preset paper": "--refine 0.25",
     "warp-mca sweep two_link": f"{SMALL} --workers 1",
     "warp-mca tradeoff two_link": "--budget 30 --refine 0.35 --duration 1e-5 --force",

@@ -172,7 +172,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-QUICK = ["--duration", "1e-6", "--set", "across=0.5"]
+QUICK = ["--duration", "1e-6", "--set", "across=0.5", "--set", "struck=off"]
 
 
 def test_a_command_runs_a_drop(folder: Path):
@@ -188,7 +188,7 @@ def test_a_command_runs_all_poses_and_names_the_worst(
 ):
     monkeypatch.setattr(mca, "POSES", ("zmin", "xmin-zmin"))
     monkeypatch.setattr("warp_mca.studies.sweep.worker_count", lambda options, workers: 1)
-    words = ["run", "part.step", "--pose", "all", "--duration", "2e-6", "--set", "across=0.5", "--threads", "1"]
+    words = ["run", "part.step", "--pose", "all", "--duration", "2e-6", *QUICK[2:], "--threads", "1"]
     assert main([*words, "--out", "poses"]) == 0
     out = capsys.readouterr().out
     assert "worst" in out and "pose=zmin" in out

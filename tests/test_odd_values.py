@@ -42,6 +42,7 @@ SOUND: dict[type, Any] = {
     mca.NestedPlate: mca.NestedPlate(length=0.1, width=0.1, height=0.05, core_size=0.002),
     mca.MeshFile: mca.MeshFile("none.vtu"),
     mca.Cad: mca.Cad("none.step", size=0.002),
+    mca.Finer: mca.Finer((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 1e-3),
     mca.Select: mca.Select("foot", low=(0.0, 0.0, 0.0), high=(1.0, 1.0, 0.0)),
     mca.Point: mca.Point(body="low", at=(0.0, 0.0, 0.0)),
     mca.Line: LINE,
@@ -212,6 +213,8 @@ def scene_with(item: Any) -> mca.Scene:
             change = {"bodies": (dataclasses.replace(low, geometry=item), up)}
         case mca.Select():
             return scene_with(dataclasses.replace(SOUND[mca.MeshFile], select=(item,)))
+        case mca.Finer():
+            return scene_with(dataclasses.replace(SOUND[mca.Cad], finer=(item,)))
         case mca.MeshFile() | mca.Cad() | mca.Mesh():
             change = {"bodies": (dataclasses.replace(low, geometry=item), up)}
         case mca.Body():

@@ -75,13 +75,10 @@ def drop_test(
         contacts: of the bodies with each other; they become `internal`, so that F_n is the floor's.
         gravity: g [m/s^2].
         struck: greatest edge of cells where a `Cad` or an `Assembly` strikes [m]; such bodies take strains as large and
-            have stiffer contact springs. "auto": where an edge, a corner or a round place yields, the depth that the
-            fall crushes at that stress over 2 `across`, or an eighth of the cells that are there without; bodies with a
-            `size` keep it. "off" changes nothing.
-        impact: phase of the impact; None runs for 20 passes of a wave in metal along the diagonal of the parts, with
-            400 intervals.
-        name: of the scene.
-        more: other fields of `Scene`, as `criteria` and `probes`; places in space are those above the floor.
+            have penalty=10 on the floor. "auto": on an edge, a corner or a round place that yields, the depth that the
+            fall crushes over `across`, or a quarter of the size without; a `size` of a body stays. "off": none.
+        impact: its phase; None runs for 20 passes of a wave in metal along the diagonal of the parts, in 400 intervals.
+        name, more: of the scene, with other fields of it, as `criteria`; places in space are those above the floor.
 
     Returns:
         The scene; its parameters are height, pose and onto.
@@ -94,32 +91,52 @@ def drop_test(
     bodies = (parts,) if isinstance(parts, Body) else tuple(parts)
     _check(bodies, contacts, onto, more)
     validate.positive("drop_test", height=height, gravity=gravity)
-    if isinstance(struck, str) and struck not in ("auto", "off"):
-        raise bad_value("drop_test.struck", struck, "choose auto, off, or a size of cells [m]")
-    if not isinstance(struck, str):
-        validate.positive("drop_test", struck=struck)
     extent = extent_of(bodies)
-    turn = pose_rotation(pose, extent)
-    down: Vec3 = (0.0, 0.0, -gravity)
     gap, more = _settled(more, extent)
-    placed = _placed(bodies, turn, gap)
-    placed, meshes = _placed(bodies, turn, gap), [mesh_of(body) for body in bodies]
-    if finer := finer_where_struck(placed, meshes, extent.mass * gravity * height, struck):
-        placed = _placed(finer, np.eye(3), gap)  # nodes of smaller cells on round faces may lie lower
-    placed = tuple(body.drop(height, down) for body in placed)
-    duration = _PASSES * extent.diagonal / _SPEED
+    placed = _struck_bodies(bodies, extent, pose_rotation(pose, extent), gap, height * gravity, _size_asked(struck))
+    down: Vec3 = (0.0, 0.0, -gravity)
     floor = _floor(onto, extent.diagonal)
     sides = tuple(Absorbing(body="floor", nodes=side, centre=(0.0, 0.0, 0.0)) for side in _OPEN) if floor else ()
     return Scene(
         name=name,
-        bodies=placed + ((floor,) if floor else ()),
+        bodies=tuple(body.drop(height, down) for body in placed) + ((floor,) if floor else ()),
         contacts=_contacts(contacts, placed, floor, mu),
         absorbing=(*more.pop("absorbing", ()), *sides),
         gravity=down,
-        impact=impact or ImpactPhase(duration=duration, output_interval=duration / _ROWS),
+        impact=impact or _phase(_PASSES * extent.diagonal / _SPEED),
         parameters={"height": float(height), "pose": pose, "onto": onto},
         **more,
     )
+
+
+def _phase(duration: float) -> ImpactPhase:
+    return ImpactPhase(duration=duration, output_interval=duration / _ROWS)
+
+
+def _struck_bodies(
+    bodies: Sequence[Body], extent: Extent, turn: Array, gap: float, gravity_height: float, struck: float | str
+) -> list[Body]:
+    """Bodies in their pose, with finer cells where they strike; `gravity_height` is g h [m^2/s^2]."""
+    placed = _placed(bodies, turn, gap)
+    finer = finer_where_struck(placed, [mesh_of(body) for body in bodies], extent.mass * gravity_height, struck)
+    # placed again, since nodes of smaller cells on round faces may lie lower
+    return _placed(finer, np.eye(3), gap) if finer else placed
+
+
+def _size_asked(struck: float | str) -> float | str:
+    """The size of cells where parts strike, which a command line gives as text: "auto", "off" or metres.
+
+    Raises:
+        RequestError: it is none of them.
+    """
+    if struck in ("auto", "off"):
+        return struck
+    try:
+        struck = float(struck) if isinstance(struck, str) else struck
+    except ValueError:
+        raise bad_value("drop_test.struck", struck, "choose auto, off, or a size of cells [m]") from None
+    validate.positive("drop_test", struck=struck)
+    return struck
 
 
 def _settled(more: dict[str, Any], extent: Extent) -> tuple[float, dict[str, Any]]:

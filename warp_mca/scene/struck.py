@@ -24,10 +24,12 @@ from warp_mca.scene.extent import cell_values
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
 
-ROWS = 2.0  # cells over the crushed depth, for each one over a wall [-]
-PENALTY = 5.0  # of their contact with the floor: the default of bodies with flat faces suits these, not their edges [-]
+ROWS = 1.0  # cells over the crushed depth, for each one over a wall [-]
 FLAT = 1.25  # exponent of W(d) up to which a place is flat [-]
-_FINEST = 8.0  # times smaller than the cells there, at most [-]
+# Of the contact of such bodies with the floor [-]: springs of flat faces, its default, hold much of the energy where an
+# edge strikes. The shorter step is needed, too: crushed cells flatten, and became unstable with 2.
+PENALTY = 10.0
+FINEST = 4.0  # times smaller than the cells there, at most: steps are as many times more [-]
 _WORTH = 0.7  # of their size: cells that are not smaller are left as they are [-]
 _LEAST, _MOST = 1e-5, 0.2  # depths over the height of the parts, below which all is flat and above which none is [-]
 _APART = 1e-5  # of the height of a cell, by which corners at one height are taken apart [-]
@@ -94,7 +96,7 @@ def _finer(body: Body, cells: _Cells | None, lowest: float, depth: float, struck
     if not near.any():
         return body
     usual = float(cells.size[near].mean())
-    size = max(depth / (ROWS * geometry.across), usual / _FINEST) if isinstance(struck, str) else struck
+    size = max(depth / (ROWS * geometry.across), usual / FINEST) if isinstance(struck, str) else struck
     if size > _WORTH * usual:
         return body
     turn = rotation_matrix(np.array(body.rotation))
