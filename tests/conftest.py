@@ -73,6 +73,12 @@ def bars() -> FlyingBars:
     return FlyingBars()
 
 
+@pytest.fixture(autouse=True)
+def figures_drawn_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No helpers draw figures, so that tests see who draws them and how."""
+    monkeypatch.setattr("warp_mca.results.drawing.MOST", 1 << 20)
+
+
 @pytest.fixture
 def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures are made, but not drawn."""

@@ -18,7 +18,7 @@ from warp_mca.cli.accuracy import accuracy_asked
 from warp_mca.cli.recorders import recorders_of
 from warp_mca.cli.request import Request, read_request
 from warp_mca.cli.resume import command_of
-from warp_mca.cli.warp_start import start_warp
+from warp_mca.cli.warp_start import RUN, start_warp
 from warp_mca.phases.every import DEFAULT, Every
 from warp_mca.results.drawing import begin_helpers
 from warp_mca.system.threads import thread_count
@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> None:
     request = read_request(args)
     out = args.out or Path(request.label if args.method == "mca" else f"{request.label}-{args.method}")
     recorders = recorders_of(args, out)
-    start_warp(*_needed(args))
+    start_warp(*RUN, *_needed(args))
     with _noting_what_is_left(args), nullcontext() if args.quiet else progress_bar() as progress:
         result = mca.run(
             request.scene,
@@ -80,7 +80,7 @@ def run(args: argparse.Namespace) -> None:
 
 
 def _needed(args: argparse.Namespace) -> list[str]:
-    """Modules that the run will use, which take long to import, unless helpers are begun for its figures."""
+    """Modules that its figures need, which take long to import, unless helpers are begun for them."""
     drawn_here = args.figures == "png" and not begin_helpers(thread_count(None))
     return ["matplotlib.backends.backend_agg"] if drawn_here else []
 

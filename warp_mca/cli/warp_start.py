@@ -10,6 +10,16 @@ from importlib import import_module
 
 from warp_mca.base.errors import bad_value
 
+RUN = (  # what every run imports, from the first to the last
+    "warp_mca.accuracy.plan",
+    "warp_mca.phases.prepare",
+    "warp_mca.phases.simulate",
+    "warp_mca.phases.impact",
+    "warp_mca.recorders.frames",
+    "scipy.spatial.transform",
+    "scipy.ndimage",
+)
+
 
 def _import(*names: str) -> None:
     with suppress(Exception):  # a module that fails to import raises again where it is used

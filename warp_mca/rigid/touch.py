@@ -93,4 +93,4 @@ def _root(value: Callable[[float], float], low: float, high: float) -> float:
     ends = value(low), value(high)
     if ends[0] * ends[1] > 0.0:
         return low if abs(ends[0]) < abs(ends[1]) else high
-    return brent_root(value, low, high, ends, ROOT)
+    return float(brent_root(value, low, high, ends, ROOT))

@@ -57,7 +57,7 @@ class _EdgeSearch:
     def __init__(self, mesh: wp.Mesh, inner: wp.array, own: wp.array, room: int) -> None:
         edge = wp.zeros((room, 2), dtype=wp.int32, device="cpu")
         depth, at = (wp.zeros(room, dtype=kind, device="cpu") for kind in (wp.float32, wp.vec3f))
-        self.room, self._of = room, (mesh, inner, own)  # as above
+        self.room, self._of, self._count = room, (mesh, inner, own), room  # as above
         self._edge, self._depth, self._at = edge.numpy(), depth.numpy(), at.numpy()
         inputs = [mesh.id, inner, edge, own]
         self._launch: Any = wp.launch(
@@ -67,7 +67,9 @@ class _EdgeSearch:
     def found(self, edge: Index) -> tuple[NDArray, NDArray]:
         """Depth and place of each edge [m], as `Skin.edges_in`, from the origin of the mesh; valid until the next."""
         self._edge[: len(edge)] = edge
-        self._launch.set_dim(len(edge))
+        if len(edge) != self._count:
+            self._count = len(edge)
+            self._launch.set_dim(self._count)
         self._launch.launch()
         return self._depth[: len(edge)], self._at[: len(edge)]
 
@@ -120,6 +122,10 @@ class Skin:
         return own | {"_stale": True, "_searches": {}}
 
     @cached_property
+    def _ends(self) -> Index:
+        return np.ascontiguousarray(self.edge.T)  # of which numpy takes each in half the time
+
+    @cached_property
     def _mesh(self) -> wp.Mesh:
         """The triangles at the start, whatever the body has become by then, so that stored runs go on alike."""
         points = wp.array((self.X - self._origin).astype(np.float32), dtype=wp.vec3f, device="cpu")
@@ -161,7 +167,7 @@ class Skin:
     def box(self) -> Array:
         """Least and greatest coordinates [m], shape (2, 3), float64."""
         columns = self.x.T  # as in `near`
-        return np.array([[f(column) for column in columns] for f in (np.min, np.max)])
+        return np.array([[reduce(column) for column in columns] for reduce in (np.minimum.reduce, np.maximum.reduce)])
 
     def bent(self) -> float:
         """Greatest distance of a node from its place in the undeformed body, moved rigidly as fits best [m]."""
@@ -201,7 +207,7 @@ class Skin:
             near &= (column > lower[axis]) & (column < upper[axis])
         if not near.any():
             return np.zeros(0, dtype=np.int32)
-        return np.flatnonzero(near[self.edge[:, 0]] | near[self.edge[:, 1]]).astype(np.int32)
+        return (near[self._ends[0]] | near[self._ends[1]]).nonzero()[0].astype(np.int32)
 
     def samples(self, chosen: Index) -> Array:
         """Ends and middles of chosen edges, moved into the body [m], shape (sample_count, 3), float64."""
