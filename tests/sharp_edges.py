@@ -53,6 +53,7 @@ def in_frame(kind: str, masters: tuple[str, ...], velocity: tuple, **contact) ->
         mca.Body(name="frame", geometry=frame(kind), material=HARD),
     )
     slave = mca.Surface(body="block", nodes="boundary")
+    contact = {"two_way": False} | contact
     contacts = tuple(mca.Contact(slave=slave, master=mca.Surface(body="frame", nodes=m), **contact) for m in masters)
     held, impact = mca.Fixed(body="frame", nodes="foot"), mca.ImpactPhase(duration=2e-4, output_interval=2e-6)
     return mca.Scene(name="frame", bodies=bodies, contacts=contacts, fixed=(held,), impact=impact)
