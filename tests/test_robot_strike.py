@@ -321,6 +321,30 @@ def test_command_prints_a_scene_file_that_strikes(tmp_path, capsys):
     assert replace(scene, name="x").bodies == scene.bodies
 
 
+BENT = """<mujoco><compiler angle="radian" autolimits="true"/><worldbody>
+  <body name="base"><geom name="foot" size="0.05" mass="1"/>
+    <body name="upper"><joint name="shoulder" axis="0 1 0" range="-1 1"/>
+      <geom type="capsule" fromto="0 0 0 0.2 0 0" size="0.02" mass="1"/>
+      <body name="lower" pos="0.2 0 0"><joint name="elbow" axis="0 1 0" range="0.5 1.5"/>
+        <joint name="twist" range="0.2 0.4"/><geom name="tip" size="0.03" pos="0.2 0 0" mass="0.5"/>
+  </body></body></body></worldbody></mujoco>"""
+
+
+def test_command_bends_joints_that_start_beyond_their_ranges_and_lays_a_floor_below(tmp_path, capsys):
+    """A base is nothing to strike, and links that overlap each other at the start are not looked at."""
+    (tmp_path / "bent.xml").write_text(BENT)
+    main(["run", str(tmp_path / "bent.xml")])
+    space: dict = {}
+    exec(compile(said := capsys.readouterr().out, "bent_strike.py", "exec"), space)
+    assert 'qpos={"elbow": 1.0, "twist": 0.3}' in said and "touch=('lower',)" in said
+    low = -0.2 * np.sin(1.0) * np.cos(0.3) - 0.03 - 0.05
+    (contact,) = space["build"]().contacts
+    assert contact.master.point[2] == pytest.approx(low, abs=6e-4)
+    remedy = r"Robot.qpos of joint elbow = 0.0: start within its limits, 0.5 to 1.5; so must twist"
+    with pytest.raises(mca.RequestError, match=remedy):
+        mca.Robot(tmp_path / "bent.xml").swing()
+
+
 def pair_of(shape: str, offset: float) -> str:
     """A sphere of 1 kg that flies along x at a body of 3 kg, both free."""
     return f"""<mujoco><option gravity="0 0 0"/><worldbody>

@@ -84,8 +84,8 @@ class Motors(NamedTuple):
 def freedoms_of(machine: Machine, joint: int, qpos: Array, gearing: Gearing) -> tuple[Freedom, ...]:
     """The freedom of a joint of the file, at coordinates `qpos`, with what tendons and equalities do to it.
 
-    A ball with dry friction or a range is three hinges, the first along the axis about which it is turned; that is right
-    to first order in what it turns in the impact.
+    A ball with dry friction or a range is three hinges, the first along the axis about which it is turned; that is
+    right to first order in what it turns in the impact.
 
     Positions count from the pose in which axes are given, so that `ref` of the file is taken off.
 

@@ -11,7 +11,7 @@ from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.robots.masses import MassProperties, of_link, regular, rest_of
-from warp_mca.robots.reading import Names, compiled, mujoco, with_masses
+from warp_mca.robots.reading import Names, compiled, mujoco, scenery, with_masses
 from warp_mca.robots.sockets import sockets_of
 from warp_mca.robots.start import start_of
 from warp_mca.robots.warned import warnings_logged
@@ -120,9 +120,9 @@ class Machine:
 
     @property
     def meets_the_world(self) -> bool:
-        """Whether the file has a geom of the world that something may touch."""
-        fixed = self.model.body_weldid[self.model.geom_bodyid] == 0
-        return bool((self.model.geom_contype | self.model.geom_conaffinity)[fixed].any())
+        """Whether the file has a geom beside the machine, not of its base, that something may touch."""
+        beside = scenery(self.model)[self.model.geom_bodyid]
+        return bool((self.model.geom_contype | self.model.geom_conaffinity)[beside].any())
 
     def set(self, data: Any, y: Array) -> None:
         """Give data coordinates and rates."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
 
 if TYPE_CHECKING:
@@ -199,6 +200,16 @@ def _refused_drive(mj: Any, model: Any, k: int) -> Iterator[str]:
     for what in ("actuator_armature", "actuator_damping", "actuator_delay"):
         if getattr(model, what, None) is not None and getattr(model, what)[k].any():
             yield f"it has {what.removeprefix('actuator_')} of its own; give that to the joint, or leave it out"
+
+
+def scenery(model: Any) -> Array:
+    """Which bodies stand beside the machine: those that do not move and carry none that does, shape (nbody,), bool."""
+    fixed, base = model.body_weldid == 0, np.zeros(model.nbody, dtype=bool)
+    for link in range(model.nbody - 1, 0, -1):
+        if base[link] or not fixed[link]:
+            base[model.body_parentid[link]] = True
+    base[0] = False
+    return fixed & ~base
 
 
 class Names:

@@ -50,11 +50,14 @@ def start_of(machine: Machine, robot: Robot) -> Array:
 
 
 def _check_limits(machine: Machine, y: Array) -> None:
+    beyond = []
     for place, dof, (low, high) in zip(machine.limited_q, machine.limited, machine.range, strict=True):
-        if not low - (beyond := BEYOND * (high - low)) <= y[place] <= high + beyond:
-            name = machine.names.joint(int(machine.model.dof_jntid[dof]))
-            remedy = f"start within its limits, {low:g} to {high:g}"
-            raise bad_value(f"Robot.qpos of joint {name}", float(y[place]), remedy)
+        if not low - (more := BEYOND * (high - low)) <= y[place] <= high + more:
+            beyond.append((machine.names.joint(int(machine.model.dof_jntid[dof])), float(y[place]), low, high))
+    if beyond:
+        (name, value, low, high), *others = beyond
+        also = f"; so must {', '.join(other for other, *_ in others)}" if others else ""
+        raise bad_value(f"Robot.qpos of joint {name}", value, f"start within its limits, {low:g} to {high:g}{also}")
 
 
 def _check_loops(machine: Machine) -> None:

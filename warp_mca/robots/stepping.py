@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 TOLERANCE = 1e-10  # relative error of a step: momenta of a free chain drift by 1e-12 in a swing, at half again the cost
 IMPLICIT_TOLERANCE = 1e-9  # likewise of the implicit scheme: rates of arms with stiff servos are right to 1e-9
-SMALLEST = 1e-3  # of the tolerance, the absolute error of a coordinate; all of it where rounding of stiff drives is more
+SMALLEST = 1e-3  # of the tolerance, the absolute error of a coordinate; the implicit scheme takes all, for rounding
 MAX_TURN_PER_STEP = 0.05  # as of the planar chain: a gap has at most one minimum in a step
 SHORT = 1e-3  # mean step below which it is asked what makes it so short [s]
 LOOK = 20  # steps from one such question to the next

@@ -124,8 +124,9 @@ class Freedom:
         at: point of the axis, or of a ball [m]; None takes that of the joint.
         position: q in the pose in which the scene places the bodies [rad], [m].
         stiffness: of a spring [N m/rad], [N/m].
-        rest: position at which the spring is at rest [rad], [m]; of a ball, whose spring gives -k r, r the rotation vector
-            from rest, the vector from where the scene places the body to rest, in the body's frame; 0 is there.
+        rest: position at which the spring is at rest [rad], [m]. That of a ball gives the torque -k r, r the rotation
+            vector from rest; its `rest` is the rotation vector in the body's frame from the pose in which the scene
+            places the bodies, or 0 for that pose.
         damping: of a viscous damper [N m s/rad], [N s/m]; a ball has one about all axes.
         friction: greatest torque [N m] or force [N] of Coulomb friction.
         friction_rate: rate above which friction is whole: it is `friction` times tanh(q' / friction_rate) [rad/s],

@@ -106,14 +106,15 @@ def _body_joint(
     for freedom, at in zip(whole.freedoms, whole.points, strict=True):
         o = origin + R @ np.array(at) - place
         axes = np.eye(3) if freedom.kind == "ball" else (R @ np.array(freedom.unit))[None]
-        rest = (R @ np.broadcast_to(freedom.rest, 3)).tolist() if freedom.kind == "ball" else [freedom.rest]
+        rest = np.broadcast_to(freedom.rest, len(axes))
+        rest = R @ rest if freedom.kind == "ball" else rest
         for k, direction in enumerate(axes):
             kind.append(KINDS[freedom.kind])
             part.append(k)
             axis.append(direction)
             point.append(o)
             position.append(freedom.position)
-            drive.append(_drive(freedom, rest[k]))
+            drive.append(_drive(freedom, float(rest[k])))
             motor.append(_motor(freedom))
             tables.append(_table(freedom))
         if freedom.kind != "ball":
