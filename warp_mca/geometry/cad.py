@@ -188,7 +188,7 @@ def _meshed_by(cad: Cad, algorithms: dict[str, float]) -> Mesh:
                 raise
             raise _MeshingError(str(error)) from error
         mesh = read_cells(gmsh.model, scale, scale**3 * exact, names)
-        return replace(mesh, notes=(*mesh.notes, *notes))
+        return replace(mesh, notes=coarse.notes if coarse else (*mesh.notes, *notes))
 
 
 def _sized(gmsh: Any, cad: Cad, scale: float) -> float:

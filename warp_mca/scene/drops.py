@@ -100,7 +100,7 @@ def drop_test(
     return Scene(
         name=name,
         bodies=tuple(body.drop(height, down) for body in placed) + ((floor,) if floor else ()),
-        contacts=_contacts(contacts, placed, floor, mu),
+        contacts=_contacts(contacts, bodies, placed, floor, mu),
         absorbing=(*more.pop("absorbing", ()), *sides),
         gravity=down,
         impact=impact or _phase(_PASSES * extent.diagonal / _SPEED),
@@ -159,16 +159,23 @@ def _check(bodies: Sequence[Body], contacts: Sequence[object], onto: str, more: 
 
 
 def _contacts(
-    contacts: Sequence[Contact | ContactAll], bodies: Sequence[Body], floor: Body | None, mu: float
+    contacts: Sequence[Contact | ContactAll],
+    bodies: Sequence[Body],
+    placed: Sequence[Body],
+    floor: Body | None,
+    mu: float,
 ) -> tuple[Contact | ContactAll, ...]:
-    """The contacts of the bodies with each other, and of each with the floor, which has none with itself."""
+    """The contacts of the bodies with each other, and of each with the floor, which has none with itself.
+
+    Springs are stiffer of bodies whose geometry in their place has finer cells.
+    """
     master = Surface(body="floor", nodes="zmax") if floor else RigidPlane(normal=(0.0, 0.0, 1.0))
     skins = [Surface(body=body.name, nodes="boundary") for body in bodies if not body.is_inertia]
     among = [replace(c, internal=True) for c in contacts]
     if floor:
         itself = ("floor", "floor")
         among = [replace(c, exclude=(*c.exclude, itself)) if isinstance(c, ContactAll) else c for c in among]
-    finer = {body.name: PENALTY for body in bodies if getattr(body.geometry, "finer", ())}
+    finer = {b.name: PENALTY for a, b in zip(bodies, placed, strict=True) if a.geometry is not b.geometry}
     return (*among, *(Contact(slave=skin, master=master, mu=mu, penalty=finer.get(skin.body)) for skin in skins))
 
 

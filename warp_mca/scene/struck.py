@@ -53,12 +53,16 @@ def finer_where_struck(
     if struck == "off" or not drawn:
         return []
     parts = {body.name: _cells(body, mesh) for body, mesh in drawn}
-    lowest = min(float(part.heights.min()) for part in parts.values())
+    lowest = min(float(_in_place(body, mesh)[:, 2].min()) for body, mesh in zip(bodies, meshes, strict=True))
     heights = np.concatenate([part.heights for part in parts.values()]) - lowest
     depth, exponent = crushed_depth(heights, np.concatenate([part.work for part in parts.values()]), energy)
     depth = depth if exponent > FLAT else 0.0
     found = [_finer(body, parts.get(body.name), lowest, depth, struck) for body in bodies]
     return found if any(one is not other for one, other in zip(found, bodies, strict=True)) else []
+
+
+def _in_place(body: Body, mesh: Mesh) -> Array:
+    return mesh.points @ rotation_matrix(np.array(body.rotation)).T + np.array(body.position)
 
 
 class _Cells(NamedTuple):
@@ -79,7 +83,7 @@ def _cells(body: Body, mesh: Mesh) -> _Cells:
     from warp_mca.geometry.cell_types import TETRA10, linear_type
 
     cells = mesh.others[TETRA10.name][:, : linear_type(TETRA10.name).corners]
-    corners = (mesh.points @ rotation_matrix(np.array(body.rotation)).T + np.array(body.position))[cells]
+    corners = _in_place(body, mesh)[cells]
     volume = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6.0
     edges = [corners[:, i] - corners[:, j] for i, j in combinations(range(4), 2)]
     size = np.mean([np.linalg.norm(edge, axis=1) for edge in edges], axis=0)
@@ -92,7 +96,7 @@ def _finer(body: Body, cells: _Cells | None, lowest: float, depth: float, struck
     geometry: Any = body.geometry
     if cells is None or body.rigid or (struck == "auto" and (geometry.size is not None or not depth)):
         return body
-    near = cells.heights[:, 0] <= lowest + depth
+    near = cells.heights[:, 0] <= lowest + (depth if isinstance(struck, str) else max(depth, struck))
     if not near.any():
         return body
     usual = float(cells.size[near].mean())
@@ -138,4 +142,5 @@ def _work(heights: Array, work: Array, depth: float) -> float:
     for i in range(4):
         others = [j for j in range(4) if j != i]
         share += np.maximum(depth - z[:, i], 0.0) ** 3 / np.prod(z[:, others] - z[:, i : i + 1], axis=1)
-    return float((np.clip(share, 0.0, 1.0) * work[reached]).sum())
+    share, work = np.clip(share, 0.0, 1.0), work[reached]
+    return float((share[share > 0.0] * work[share > 0.0]).sum())  # of what never yields the work is infinite
