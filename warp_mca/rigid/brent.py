@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable
 
 Point = tuple[float, float]  # where, and the value there
-MOST = 100  # evaluations; each third one at least halves the interval
+MOST = 100  # evaluations, as `brentq` has them
 
 
 def brent_root(
