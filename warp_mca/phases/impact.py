@@ -89,7 +89,7 @@ class Impact:
         """
         alike = with_alike_passes([item.model for item in ready])
         ready = [replace(item, model=model) for item, model in zip(ready, alike, strict=True)]
-        self.ready, self._threads = tuple(ready), threads
+        self.ready = tuple(ready)
         self.steps = divide_alike([(item.scene, item.model) for item in ready], span)
         model = join_models([item.model for item in ready])
         model = with_floating_frames(model, [item.scene for item in ready], span, precision)
@@ -119,7 +119,7 @@ class Impact:
     @cached_property
     def together(self) -> Together:
         """Cells of several scenes whose bending is looked at."""
-        return Together([(item.ledger.model, item.looks.samples) for item in self.scene_runs], self._threads)
+        return Together([(item.ledger.model, item.looks.samples) for item in self.scene_runs])
 
     def look_at_the_end(self) -> None:
         """Look at the bending of all scenes of a batch, for their results; a lone one looks itself."""

@@ -23,6 +23,8 @@ MISSED = 5  # energy of bending stresses beyond the yield stress in cells that d
 FOLDED = 6  # cells of rubber that are inside out at a corner, the most that a look saw [-]
 COLUMNS = 7
 
+_CYCLE = [0, 1, 2, 0, 1]  # rows and columns of a matrix, with those that come after the last ones
+
 
 @dataclass(frozen=True)
 class Cells:
@@ -99,9 +101,8 @@ def turned_back(F: Array) -> tuple[Array, Array]:
 
 def _cofactors(A: Array) -> Array:
     """Of each matrix, shape (3, 3, count)."""
-    after, last = [1, 2, 0], [2, 0, 1]
-    B, C = A[after], A[last]
-    return B[:, after] * C[:, last] - B[:, last] * C[:, after]
+    B = A[_CYCLE][:, _CYCLE]
+    return B[1:4, 1:4] * B[2:, 2:] - B[1:4, 2:] * B[2:, 1:4]
 
 
 def deviator_square(strain: Array) -> Array:

@@ -13,8 +13,8 @@ energy in bricks; cells whose sides lean across the wall lock in all of them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import cast
 
 import numpy as np
@@ -53,6 +53,15 @@ class Bricks:
     half: Array
     mode: Array
     volume: Array
+
+    @cached_property
+    def leaning(self) -> list[tuple[int, int, int, Array]]:
+        """Axes m, i, k, and how far sides across edge i lean along it over half of edge k [m], shape (cell_count,)."""
+        found = []
+        for m in range(3):
+            for i, k in (((m + 1) % 3, (m + 2) % 3), ((m + 2) % 3, (m + 1) % 3)):
+                found.append((m, i, k, np.einsum("an,an->n", self.mode[m], self.edge[:, i])))
+        return found
 
 
 def bricks_of(cells: Cells) -> Bricks:
@@ -102,18 +111,12 @@ def _wasted(strain: Array, p: Array, bricks: Bricks, E: float, projected: bool =
     `projected`, cells that stretch in turn by p c_i / (3 h_i^2) bend by less than their sides turn.
     """
     found, h = np.zeros_like(bricks.volume), bricks.half
-    for m, i, k, lean in _leaning(bricks):
-        across = np.einsum("an,abn,bn->n", bricks.edge[:, k], strain, bricks.edge[:, k])
+    along = [np.einsum("an,abn,bn->n", bricks.edge[:, k], strain, bricks.edge[:, k]) for k in range(3)]
+    for m, i, k, lean in bricks.leaning:
+        across = along[k]
         more = projected * (lean / h[i]) ** 2 / 3.0
         found -= (1.0 + more) * p[m, i] * (lean / h[k] ** 2 * across + more / 3.0 * p[m, i] / h[i] ** 2)
     return 0.5 * E * bricks.volume * found
-
-
-def _leaning(bricks: Bricks) -> Iterator[tuple[int, int, int, Array]]:
-    """Axes m, i, k, and how far sides across edge i lean along it over half of edge k [m], shape (cell_count,)."""
-    for m in range(3):
-        for i, k in (((m + 1) % 3, (m + 2) % 3), ((m + 2) % 3, (m + 1) % 3)):
-            yield m, i, k, np.einsum("an,an->n", bricks.mode[m], bricks.edge[:, i])
 
 
 def lean(cells: Cells) -> bool:
@@ -122,7 +125,7 @@ def lean(cells: Cells) -> bool:
     h = bricks.half
     return any(
         max((3.0 * (side * h[i] / h[k] ** 2) ** 2).max(), ((side / h[i]) ** 2 / 3.0).max()) > LEAST
-        for _, i, k, side in _leaning(bricks)
+        for _, i, k, side in bricks.leaning
     )
 
 

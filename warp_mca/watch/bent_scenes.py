@@ -1,12 +1,8 @@
-"""Owns looks at the bending of scenes side by side: cells of equal kind and material go through numpy together.
-
-Lots of them are looked at by several threads, because numpy computes without the interpreter's lock.
-"""
+"""Owns looks at the bending of scenes side by side: cells of equal kind and material go through numpy together."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import pairwise
 
@@ -17,15 +13,14 @@ from warp_mca.watch.bending import greater
 from warp_mca.watch.bent_cells import COLUMNS, Array, Cells
 from warp_mca.watch.bent_hexahedra import JOINED
 
-MOST_THREADS = 8  # more wait for the interpreter between two calls of numpy
 MOST = 2048  # cells that are looked at together: more leave the cache, and take longer each
 
 
 class Together:
     """Cells of several scenes that are looked at."""
 
-    def __init__(self, scenes: Sequence[tuple[Model, Sequence[Cells]]], threads: int = 1) -> None:
-        """Take the model and the cells of each scene, for so many threads; nodes are counted from scene to scene."""
+    def __init__(self, scenes: Sequence[tuple[Model, Sequence[Cells]]]) -> None:
+        """Take the model and the cells of each scene; nodes are counted from scene to scene."""
         first = np.cumsum([0, *(len(model.X) for model, _ in scenes)])
         self._nodes = [slice(a, b) for a, b in pairwise(first)]
         self._bodies = [len(model.element_start) for model, _ in scenes]
@@ -41,7 +36,6 @@ class Together:
             for own in kinds.values()
             for lot in _lots(own)
         ]
-        self._threads = min(threads, len(self._lots), MOST_THREADS)
 
     @np.errstate(all="ignore")  # as in `seen`
     def seen(self, u: Array, before: Sequence[Array]) -> list[Array]:
@@ -50,25 +44,13 @@ class Together:
         They are those of `bending.seen` but for round-off.
         """
         found = [np.zeros((count, COLUMNS)) for count in self._bodies]
-        for (lot, _), rows in zip(self._lots, self._energies(u), strict=True):
-            for (scene, item), row in zip(lot, rows, strict=True):
+        for lot, cells in self._lots:
+            for (scene, item), row in zip(lot, cells.energies(u, cells).reshape(-1, COLUMNS), strict=True):
                 found[scene][item.body] += item.share * row
         for row, nodes in zip(found, self._nodes, strict=True):
             row *= np.isfinite(u[nodes]).all()
             row[np.isnan(row)] = 0.0
         return [greater(new, old) for new, old in zip(found, before, strict=True)]
-
-    def _energies(self, u: Array) -> list[Array]:
-        """Of the cells of each scene in each lot."""
-        if self._threads < 2:
-            return [_energies(cells, u) for _, cells in self._lots]
-        with ThreadPoolExecutor(self._threads, "bending") as pool:
-            return list(pool.map(lambda lot: _energies(lot[1], u), self._lots))
-
-
-@np.errstate(all="ignore")  # a thread has its own
-def _energies(cells: Cells, u: Array) -> Array:
-    return cells.energies(u, cells).reshape(-1, COLUMNS)
 
 
 def _lots(own: Sequence[tuple[int, Cells]]) -> list[list[tuple[int, Cells]]]:
