@@ -7,7 +7,7 @@ import warp as wp
 
 from warp_mca.kernels.contact.bond import HOLDS, hold_bond
 from warp_mca.kernels.contact.laws import PLAIN, Laws
-from warp_mca.kernels.contact.nearest import Master, nearest_face
+from warp_mca.kernels.contact.nearest import Master, nearest_function
 from warp_mca.kernels.contact.pairs import Pairs, pair_factor
 from warp_mca.kernels.contact.search import STALE, TOO_DEEP, moved_too_far
 from warp_mca.kernels.contact.settle import meet_side, settle_functions
@@ -20,11 +20,19 @@ from warp_mca.kernels.hardware.shared_memory import shared_functions
 from warp_mca.kernels.records.extremes import add_normal_force
 
 BLOCK_DIM = 128  # threads of a block, which needs no more registers than a block of elements
-LANES = 4  # GPU threads per master node, which share the faces around it
+LANES = 4  # GPU threads of a slave node, which share its candidate faces, and of a master node, which share its own
+MOST_THREADS = 1 << 15  # of all slaves, beyond which they fill a GPU with one thread each
+
+
+def slave_lanes(lanes: int, count: int) -> int:
+    """How many of `lanes` threads share the candidate faces of each of `count` slaves."""
+    return lanes if lanes * count <= MOST_THREADS else 1
 
 
 @cache
-def surface_kernel(friction: bool, each: bool, laws: Laws = PLAIN, noted: bool = False, general: bool = False) -> Any:
+def surface_kernel(
+    friction: bool, each: bool, laws: Laws = PLAIN, noted: bool = False, general: bool = False, lanes: int = 1
+) -> Any:
     """Kernel: push each slave node that penetrates a candidate face back along the normal of that face.
 
     `nearest_face` chooses the face, and `reachable` checks that the node can have come to that depth. The kernel takes
@@ -35,10 +43,10 @@ def surface_kernel(friction: bool, each: bool, laws: Laws = PLAIN, noted: bool =
     where the node slides on to a softer face, and the energy that the spring loses then is booked; it does not rise
     until the spring opens.
     `noted`: keep the recent force on each node, which masters with several sides need. `general`: springs have the
-    factors of `Pairs`.
+    factors of `Pairs`. On a GPU, `lanes` threads share the candidates of a slave; the one that found the face goes on.
     """
     settle, let_go, leave = settle_functions(friction, laws)
-    pressure = pressure_function(friction)
+    pressure, nearest_face = pressure_function(friction), nearest_function(lanes)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
     Table = Pairs if general else wp.int32
 
@@ -66,23 +74,25 @@ def surface_kernel(friction: bool, each: bool, laws: Laws = PLAIN, noted: bool =
     ):
         wait_for_previous()
         let_next_begin()
-        s = first + wp.tid()
+        lane = wp.tid() % wp.static(lanes)
+        s = first + wp.tid() // wp.static(lanes)
         i = slave[s]
         k = of(scene, s)
         along = wp.vec3f(pressure(s, spring))
-        near = nearest_face(X, u, master, s, X[i] + u[i], along)
         held = spring.held[s]
         bonded = bool(False)
         if wp.static(laws.bond):
             bonded = spring.bond[s] == wp.static(HOLDS)
-            if bonded:
+        near, holds = nearest_face(X, u, master, s, X[i] + u[i], along, lane)
+        if wp.static(laws.bond):
+            if bonded and lane == 0:
                 force = hold_bond(
                     s, i, k, X, u, v, master, stiffness[s], of(per_newton, k), dt, spring, normal_force_out
                 )
                 nodal_force_out[i] = nodal_force_out[i] + force
                 if wp.static(noted):
                     recent_out[i] = recent(recent_out[i], force)
-        if near.face >= 0 and not bonded:
+        if near.face >= 0 and holds and not bonded:
             touch = meet_side(X, u, v, master, i, near, stiffness[s], dt, held, along)
             if wp.static(general):
                 factor = pair_factor(pairs, s, near.face)
@@ -93,11 +103,11 @@ def surface_kernel(friction: bool, each: bool, laws: Laws = PLAIN, noted: bool =
             nodal_force_out[i] = nodal_force_out[i] + force
             if wp.static(noted):
                 recent_out[i] = recent(recent_out[i], force)
-        elif not bonded:
+        elif holds and not bonded:
             force = let_go(s, i, X, u, v, master, dt, near.front, held, spring)
             if wp.static(laws.returns):
                 nodal_force_out[i] = nodal_force_out[i] + force
-        if moved_too_far(u[i], u_search[i], of(margin, k)):
+        if lane == 0 and moved_too_far(u[i], u_search[i], of(margin, k)):
             flag_out[k, STALE] = 1
 
     return begins_early(touch_surface)

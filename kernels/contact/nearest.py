@@ -1,9 +1,13 @@
 """Owns the choice of the candidate face that a slave node penetrates, and the conditions under which they touch."""
 
+from functools import cache
+from typing import Any
+
 import warp as wp
 
 from warp_mca.kernels.contact.projection import area_vector, interpolate, is_edge, project_on_face
 from warp_mca.kernels.contact.spring import FAR
+from warp_mca.kernels.hardware.shared_memory import shared_functions
 
 # Lengths, as fractions of the edges of a face
 _FOLD = 0.01  # extra depth allowed at once when a node slides through a fold into the rising neighbour
@@ -209,3 +213,50 @@ def nearest_of(
                 best.front = wp.min(best.front, gap)
         f = master.candidate[s, wp.min(c + stride, master.candidate.shape[1] - 1)]
     return best
+
+
+@cache
+def nearest_function(lanes: int) -> Any:
+    """The function that gives `nearest_face` by `lanes` threads of a GPU, which share the candidates of a spring.
+
+    It returns what thread q found, and whether that, or that there is none, holds for the node.
+    """
+    _, exchange = shared_functions("float64")
+
+    @wp.func
+    def nearest_of_lanes(
+        X: wp.array(dtype=wp.vec3d),
+        u: wp.array(dtype=wp.vec3d),
+        master: Master,
+        s: int,
+        x: wp.vec3d,
+        along: wp.vec3f,
+        q: int,
+    ):
+        near = nearest_of(X, u, master, s, x, along, q, wp.static(lanes))
+        holds = bool(True)
+        if wp.static(lanes > 1):
+            gap = near.gap
+            beside = near.beside
+            face = near.face
+            for k in range(wp.static(lanes.bit_length() - 1)):
+                other_gap = exchange(gap, 1 << k)
+                other_beside = exchange(wp.where(beside, wp.float64(1.0), wp.float64(0.0)), 1 << k) > wp.float64(0.0)
+                other = int(exchange(wp.float64(face), 1 << k))
+                near.front = wp.min(near.front, exchange(near.front, 1 << k))
+                rank = exchange(near.front_rank, 1 << k)
+                front_face = int(exchange(wp.float64(near.front_face), 1 << k))
+                if rank < near.front_rank or (rank == near.front_rank and front_face < near.front_face):
+                    near.front_rank = rank
+                    near.front_face = front_face
+                first = comes_first(X, u, master.face, other, other_gap, other_beside, face, gap, beside)
+                if other >= 0 and (face < 0 or first):
+                    gap = other_gap
+                    beside = other_beside
+                    face = other
+            holds = near.face >= 0 and near.face == face
+            if face < 0:
+                holds = q == 0
+        return near, holds
+
+    return nearest_of_lanes

@@ -10,16 +10,13 @@ import warp as wp
 
 from warp_mca.kernels.contact.contact import LANES
 from warp_mca.kernels.contact.laws import Laws
-from warp_mca.kernels.contact.nearest import Master, Nearest, comes_first, nearest_of
+from warp_mca.kernels.contact.nearest import Master, Nearest, nearest_function
 from warp_mca.kernels.contact.search import STALE, moved_too_far
 from warp_mca.kernels.contact.settle import meet_side, settle_functions
 from warp_mca.kernels.contact.spring import Spring, pressure_function
 from warp_mca.kernels.elements.patch_layout import PATCH
-from warp_mca.kernels.hardware.shared_memory import shared_functions
 from warp_mca.kernels.nodes.gather import NodeState
 from warp_mca.kernels.resident.meeting import FORCES, NODES, arrive, wait_for
-
-_, exchange = shared_functions("float64")
 
 
 @wp.struct
@@ -43,47 +40,11 @@ class Slaves:
     per_newton: wp.float64
 
 
-@wp.func
-def nearest_of_lanes(
-    X: wp.array(dtype=wp.vec3d),
-    u: wp.array(dtype=wp.vec3d),
-    master: Master,
-    s: int,
-    x: wp.vec3d,
-    along: wp.vec3f,
-    q: int,
-):
-    """`nearest_face` by LANES lanes: what lane q found, and whether that, or nothing, holds for the node."""
-    near = nearest_of(X, u, master, s, x, along, q, wp.static(LANES))
-    gap = near.gap
-    beside = near.beside
-    face = near.face
-    for k in range(wp.static(LANES.bit_length() - 1)):
-        other_gap = exchange(gap, 1 << k)
-        other_beside = exchange(wp.where(beside, wp.float64(1.0), wp.float64(0.0)), 1 << k) > wp.float64(0.0)
-        other = int(exchange(wp.float64(face), 1 << k))
-        near.front = wp.min(near.front, exchange(near.front, 1 << k))
-        rank = exchange(near.front_rank, 1 << k)
-        front_face = int(exchange(wp.float64(near.front_face), 1 << k))
-        if rank < near.front_rank or (rank == near.front_rank and front_face < near.front_face):
-            near.front_rank = rank
-            near.front_face = front_face
-        first = comes_first(X, u, master.face, other, other_gap, other_beside, face, gap, beside)
-        if other >= 0 and (face < 0 or first):
-            gap = other_gap
-            beside = other_beside
-            face = other
-    holds = near.face >= 0 and near.face == face
-    if face < 0:
-        holds = q == 0
-    return near, holds
-
-
 @cache
 def contact_role(friction: bool, laws: Laws) -> Any:
     """The function that gives slave nodes their contact forces in each of the kernel's steps."""
     settle, let_go, leave = settle_functions(friction, laws)
-    pressure = pressure_function(friction)
+    pressure, nearest_face = pressure_function(friction), nearest_function(LANES)
 
     @wp.func
     def touch_nearest(
@@ -144,7 +105,7 @@ def contact_role(friction: bool, laws: Laws) -> Any:
             if n > 0:
                 wait_for(wp.static(NODES), n * movers, count_out)
             if lane < wp.static(PATCH):
-                near, holds = nearest_of_lanes(X, state_out.u, master, s, x + state_out.u[i], along, q)
+                near, holds = nearest_face(X, state_out.u, master, s, x + state_out.u[i], along, q)
                 if exists and holds:
                     touch_nearest(
                         s, i, X, near, along, held, slaves, master, dt, spring, state_out, normal_force_out, flag_out

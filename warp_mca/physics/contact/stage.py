@@ -58,11 +58,10 @@ class ContactStage:
             return
         slots = SLOTS if self.general and self.sides > 1 else 1
         self.kernel = (
-            contact.surface_kernel(friction, self.each, self.laws, self.noted, self.general)
+            contact.surface_kernel(friction, self.each, self.laws, self.noted, self.general, self.slave_lanes)
             if self.sides == 1
             else sides.sided_kernel(friction, self.each, self.sides // slots, self.laws, slots)
         )
-        self.lanes = contact.LANES if wp.get_device().is_cuda else 1
         self.react = contact.react_kernel(self.each, self.lanes, self.noted)
         self.bounds = search.bounds_kernel(self.each)
         self.find = search.candidates_kernel(self.each, self.sides, self.general)
@@ -83,6 +82,8 @@ class ContactStage:
         self.slave_scene = per_scene(slaves)
         self.slave = wp.array(self._join("slave"), dtype=wp.int32)
         self.stiffness = wp.array(self._join("stiffness"), dtype=wp.float64)
+        self.lanes = contact.LANES if wp.get_device().is_cuda and not self.on_plane else 1
+        self.slave_lanes = contact.slave_lanes(self.lanes, len(self.slave)) if self.sides == 1 else 1
         self.mu, self.overlaps = numbers([item.mu for item in items]), {item.initial_overlap for item in items}
         self.may_rest = items[0].plane is None or self.overlaps != {"refuse"} or model.fails
         bonded, pressed = any(item.bonds is not None for item in items), "press" in self.overlaps
@@ -172,7 +173,7 @@ class ContactStage:
     @property
     def blocks(self) -> int:
         """Blocks of threads that look at the slaves."""
-        return -(-len(self.slave) // contact.BLOCK_DIM)
+        return -(-self.slave_lanes * len(self.slave) // contact.BLOCK_DIM)
 
     def kernels(self) -> list[Any]:
         """Those of a step."""
@@ -257,7 +258,7 @@ class ContactStage:
         if self.edges:
             inputs = [self._surfaces(work, state), state.v, own.u_search]
         inputs += [self.slave_scene, self.mu, self.margin, self.per_newton, dt, own.spring]
-        split(len(self.slave), partial(launch, self.kernel, 1, inputs), CONTACT)
+        split(len(self.slave), partial(launch, self.kernel, self.slave_lanes, inputs), CONTACT)
         inputs = [state.u, own.u_search, self.master, self.face_offset, self.face_of_node, self.face]
         inputs += [own.face_count, own.face_slave, self.master_scene, self.margin, own.spring]
         split(len(self.master), partial(launch, self.react, self.lanes, inputs), CONTACT)
