@@ -146,8 +146,7 @@ class ContactStage:
             self.slave_faces = faces_of_slaves(self, self._join("slave_face"), rows)
         if self.sides > 1:
             self.edges = SlaveEdges(self)
-        self.lower = wp.zeros(len(self.face), dtype=wp.vec3f)
-        self.upper = wp.zeros(len(self.face), dtype=wp.vec3f)
+        self.lower, self.upper = (wp.zeros(len(self.face), dtype=wp.vec3f) for _ in range(2))
         self.bvh: Any = None
 
     def _place(self, model: Model) -> None:
