@@ -14,6 +14,7 @@ from warp_mca.phases.residual import Relaxation
 from warp_mca.phases.settings import Settings
 from warp_mca.physics.elements.cells import nodal_masses
 from warp_mca.rigid.equilibrium import equilibrium
+from warp_mca.rigid.pieces import free_motions, shared_elements
 from warp_mca.step.solver import Solver
 
 E, SIGMA_Y, E_T = 70e9, 110e6, 27e9
@@ -213,3 +214,31 @@ def test_forces_asked_for_again_are_those_of_a_new_search():
         assert np.array_equal(asked._forces(u), new._forces(u))
         assert asked._energies() == new._energies()
     assert asked.trial.elements[0].yielded.numpy().any()
+
+
+def test_the_inverse_of_the_stiffness_gives_the_same_shape_in_few_evaluations():
+    body = Body(mca.Box(size=(0.1, 0.01, 0.01), divisions=(12, 2, 2)), metal(0.3))
+    x = body.points - body.points.mean(axis=0)
+    bent = np.stack([-4.0 * x[:, 0] * x[:, 1], 2.0 * x[:, 0] ** 2, 0.0 * x[:, 0]], axis=1)
+    body.yielding(bent)
+    pattern = shared_elements([block.conn for block in body.solver.model.blocks], len(x))
+    alone, factored = body.relax(bent), body.relax(bent, pattern=pattern)
+    assert 3 * factored.evaluations < 2 * alone.evaluations
+    np.testing.assert_allclose(factored.u, alone.u, atol=1e-4 * np.abs(bent - alone.u).max())
+    assert factored.released == pytest.approx(alone.released, rel=1e-4)
+
+
+@pytest.mark.parametrize(("joined", "held", "count"), [("no", 0, 12), ("edge", 0, 7), ("face", 0, 6), ("edge", 3, 1)])
+def test_pieces_move_without_strain_as_their_joints_let_them(joined: str, held: int, count: int):
+    """Two cubes of a cell, side by side: apart, hinged along an edge, glued, and one of them held."""
+    corner = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], float)
+    X = np.concatenate([corner, corner + np.array([1.0, 0.0, 0.0])])
+    pairs = {"no": ([], []), "edge": ([1, 5], [8, 12]), "face": ([1, 2, 5, 6], [8, 11, 12, 15])}[joined]
+    fixed = np.zeros(X.shape, dtype=bool)
+    fixed[[0, 2, 5][:held]] = True
+    pattern = shared_elements([np.arange(8)[:, None], np.arange(8, 16)[:, None]], len(X))
+    fields = free_motions(X, np.ones(len(X)), pattern, fixed, np.array(pairs, dtype=int))
+    assert fields is not None and fields.shape == (16, 3, count)
+    assert np.abs(fields[fixed]).max(initial=0.0) < 1e-9
+    stretch = np.einsum("ijc,ijck->ijk", X[:8] - X[:8, None], fields[:8] - fields[:8, None])
+    assert np.abs(stretch).max() < 1e-9

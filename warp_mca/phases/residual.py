@@ -10,15 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
+from scipy import sparse
 
 from warp_mca.phases.settings import Settings
 from warp_mca.physics.rigid.bodies import moves_with_rigid
 from warp_mca.rigid.equilibrium import TOLERANCE, equilibrium
+from warp_mca.rigid.pieces import free_motions, shared_elements
 from warp_mca.step.solver import Solver
 from warp_mca.system.bodies import GROUND
 from warp_mca.system.model import Model
@@ -109,11 +112,34 @@ class Relaxation:
             held=self.held,
             name="the bodies",
             energy=self._energy,
+            pattern=self._pattern,
+            free=None if self._pattern is None else self._free(u),
         )
         u = self._followed(found.u)
         self._evaluate(u)
         elastic, plastic, hourglass = self._energies()
         return Shape(u=u, state=self.trial, elastic=elastic, plastic=plastic, hourglass=hourglass)
+
+    @cached_property
+    def _pattern(self) -> sparse.csr_array | None:
+        """Which nodes act on each other, those that follow others in the place of these; None with ties of skins."""
+        place = np.arange(self.model.node_count)
+        place[self.model.joint_second[self.tied]] = self.model.joint_first[self.tied]
+        return None if len(self.model.ties.slave) else self._shared(place)
+
+    def _shared(self, place: NDArray[np.integer]) -> sparse.csr_array:
+        """Which nodes share an element, or a neighbour where pressures are of nodes, each in its `place`."""
+        found = shared_elements([place[block.conn] for block in self.model.blocks], self.model.node_count)
+        by_nodes = any(stage.nodal(slice(0, 1)) is not stage.no_nodes for stage in self.solver.elements)
+        return sparse.csr_array(found @ found) if by_nodes else found
+
+    def _free(self, u: Array) -> Array | None:
+        """Motions without strain of the pieces, as `equilibrium` takes them."""
+        model, alone = self.model, self._shared(np.arange(self.model.node_count))
+        first, second = model.joint_first[self.tied], model.joint_second[self.tied]
+        held = self.held.copy()
+        held[second] = False
+        return free_motions(model.X + u, self.masses, alone, held, np.stack([first, second]))
 
     def _least(self, u: Array) -> float:
         """Elastic energy of which the share TOLERANCE is no more than that of displacements rounded anyhow [J].

@@ -1,10 +1,11 @@
 """Owns the shape that a body keeps: the static equilibrium of its internal forces with its plastic strain.
 
 Newton's method on f(u) = 0 in the space of displacements that leave the rigid motions out. Each linear step K p = f is
-solved by conjugate gradients without a matrix: K p = (f(u) - f(u + h p)) / h. The preconditioner is the diagonal of K,
-estimated from products with random signs (Bekas, Kokiopoulou and Saad, Applied Numerical Mathematics 57, 2007), the
-same for the three axes of a node. Each iteration j releases the energy a_j r_j . z_j / 2, and the sum over the last d
-iterations is what was still free to leave before them (Strakos and Tichy, ETNA 13, 2002): the measure of convergence.
+solved by conjugate gradients without a matrix: K p = (f(u) - f(u + h p)) / h. The preconditioner is the inverse of K at
+the start where a few nodes have few neighbours. Else it is the diagonal of K, estimated from products with random signs
+(Bekas, Kokiopoulou and Saad, Applied Numerical Mathematics 57, 2007), the same for the three axes of a node. Each
+iteration j releases the energy a_j r_j . z_j / 2, and the sum over the last d iterations is what was still free to
+leave before them (Strakos and Tichy, ETNA 13, 2002): the measure of convergence.
 """
 
 from __future__ import annotations
@@ -14,10 +15,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from warp_mca.base.errors import GuardError
 from warp_mca.rigid.body_motion import Motions
 from warp_mca.rigid.chain import Array
+from warp_mca.rigid.stiffness import colours, inverse, stiffness_matrix
 
 Forces = Callable[[Array], Array]
 
@@ -26,6 +29,8 @@ CONDITION = 1e6  # of the stiffness over its diagonal, in slender bodies: what m
 PROBES = 12  # products with random signs for the diagonal
 DIFFERENCE = 1e-8  # largest displacement of a difference quotient, over the body's radius of inertia
 MIN_DELAY = 50  # iterations that tell what is still free to leave
+FACTORED_DELAY = 4  # the same with the inverse of K, which takes few iterations
+MOST_NODES, MOST_COLOURS = 20_000, 80  # with which K is found and factored; each colour takes three products
 MAX_NEWTON = 20
 MAX_ITERATIONS = 20_000  # of conjugate gradients, in each linear step
 MAX_HALVINGS = 10
@@ -58,6 +63,8 @@ def equilibrium(
     held: NDArray[np.bool_] | None = None,
     name: str = "body",
     energy: Callable[[Array], float] | None = None,
+    pattern: sparse.csr_array | None = None,
+    free: Array | None = None,
 ) -> Equilibrium:
     """Relax the displacements of one body until its internal forces balance.
 
@@ -75,15 +82,19 @@ def equilibrium(
         name: of the body, for messages.
         energy: strain energy of displacements, plastic work included [J], from the same history. Where elements yield
             and unload, a step may make it smaller, though not the forces; such a step is taken too.
+        pattern: entry (i, j) where the force on node i depends on the displacement of node j, shape (node_count,
+            node_count), for the inverse of K; without it its diagonal is taken.
+        free: fields of the motions without strain, shape (node_count, 3, motion_count), float64; those of a rigid body
+            if None.
 
     Raises:
         GuardError: forces are not finite, or the search does not converge.
     """
-    search = _Search(forces, u, points, masses, held, name, energy)
+    search = _Search(forces, u, points, masses, held, name, energy, pattern, free)
     u, residual = u.copy(), search.residual(u)
-    released, drop, delay = 0.0, np.inf, MIN_DELAY
+    released, drop, delay = 0.0, np.inf, FACTORED_DELAY if search.factors else MIN_DELAY
     for _ in range(MAX_NEWTON):
-        if not residual.any() or search.rests(residual, elastic_energy):
+        if not residual.any() or search.rests(u, residual, elastic_energy):
             return Equilibrium(u=u, released=released, remaining=0.0, evaluations=search.evaluations)
         step, drop, iterations = search.linear_step(u, residual, 0.1 * TOLERANCE * elastic_energy, delay)
         delay = max(delay, iterations // 2)
@@ -106,6 +117,7 @@ class _Search:
 
     Attributes:
         evaluations: of the forces so far.
+        factors: whether K is to be factored.
     """
 
     def __init__(
@@ -117,15 +129,20 @@ class _Search:
         held: NDArray[np.bool_] | None,
         name: str,
         energy: Callable[[Array], float] | None,
+        pattern: sparse.csr_array | None,
+        free: Array | None,
     ) -> None:
         self._forces, self._masses, self._name, self._energy = forces, masses[:, None], name, energy
         self._loose = np.ones(u.shape) if held is None else (~held).astype(np.float64)
         shape = points + u
         none = np.zeros(u.shape, dtype=bool)
         motions = Motions(shape, masses @ shape / masses.sum(), masses, none if held is None else held)
-        self._span, self._rigid = DIFFERENCE * motions.radius, motions.free()
+        self._span, self._rigid = DIFFERENCE * motions.radius, motions.free() if free is None else free
         self._gram = np.linalg.inv(np.einsum("nck,n,ncl->kl", self._rigid, masses, self._rigid, optimize=True))
-        self.evaluations, self._diagonal = 0, None
+        self.evaluations, self._diagonal, self._inverse = 0, None, None
+        self._pattern = pattern
+        self._colour = colours(pattern) if pattern is not None and len(u) <= MOST_NODES else None
+        self.factors = self._colour is not None and self._colour.max() < MOST_COLOURS
 
     def residual(self, u: Array) -> Array:
         """Forces that deform [N]: without those on held axes, and without net force and moment on free motions.
@@ -133,15 +150,25 @@ class _Search:
         Raises:
             GuardError: they are not finite.
         """
+        force = self._internal(u)
+        net = self._gram @ np.einsum("nck,nc->k", self._rigid, force)
+        return force - self._loose * self._masses * (self._rigid @ net)
+
+    def _internal(self, u: Array) -> Array:
+        """Forces [N], without those on held axes."""
         self.evaluations += 1
         force = self._loose * self._forces(u)
         if not np.isfinite(force).all():
             raise GuardError(f"the internal forces of {self._name} became infinite while its shape at rest was sought")
-        net = self._gram @ np.einsum("nck,nc->k", self._rigid, force)
-        return force - self._loose * self._masses * (self._rigid @ net)
+        return force
 
-    def rests(self, residual: Array, elastic_energy: float) -> bool:
+    def rests(self, u: Array, residual: Array, elastic_energy: float) -> bool:
         """Whether forces are so small that next to no energy [J] is free to leave, in however slender a body."""
+        if self.factors and self._inverse is None:
+            self._factor(u)
+        if self._inverse:  # a step more takes few evaluations
+            free = 0.5 * float((residual * self._precondition(u, residual, residual)).sum())
+            return free <= 1e-3 * TOLERANCE * elastic_energy
         return self._diagonal is not None and CONDITION * self._size(residual) <= TOLERANCE * elastic_energy
 
     def linear_step(self, u: Array, residual: Array, enough: float, delay: int) -> tuple[Array, float, int]:
@@ -159,7 +186,7 @@ class _Search:
         for _ in range(MAX_ITERATIONS):
             Kp = self._stiffness(u, start, p)
             curvature = float((p * Kp).sum())
-            if curvature <= 0.0:
+            if curvature <= 0.0 or rz <= 0.0:
                 break
             a = rz / curvature
             step, r = step + a * p, r - a * Kp
@@ -169,6 +196,8 @@ class _Search:
             z = self._precondition(u, start, r)
             before, rz = rz, float((r * z).sum())
             p = z + (rz / before) * p
+        if drops and self._inverse:  # K differs with the direction where elements yield: a Newton step more finds it
+            return step, sum(drops), len(drops)
         if len(drops) < MAX_ITERATIONS:
             raise self.failure("it has no stiffness against some displacement")
         raise self.failure(f"a linear step takes more than {MAX_ITERATIONS} iterations")
@@ -197,12 +226,28 @@ class _Search:
         return (start - self.residual(u + h * p)) / h
 
     def _precondition(self, u: Array, start: Array, r: Array) -> Array:
-        """Diagonal of K to the power -1 times r, without rigid motions [m]."""
+        """The inverse of K, or of its diagonal, times r, without rigid motions [m]."""
         if self._diagonal is None:
             self._diagonal = self._estimate_diagonal(u, start)
-        z = r / self._diagonal
+        z = self._inverse(r) if self._inverse else r / self._diagonal
         rigid = self._gram @ np.einsum("nck,nc->k", self._rigid, self._masses * z)
         return z - self._loose * (self._rigid @ rigid)
+
+    def _factor(self, u: Array) -> None:
+        """Find K at u and its factors."""
+        assert self._pattern is not None and self._colour is not None
+        start = self._internal(u)
+
+        def product(p: Array) -> Array:
+            return (start - self._internal(u + self._span * self._loose * p)) / self._span
+
+        K = stiffness_matrix(product, self._pattern, self._colour)
+        nodal = K.diagonal().reshape(-1, 3).sum(axis=1) / np.maximum(self._loose.sum(axis=1), 1.0)
+        typical = float(np.median(np.abs(nodal[self._loose.any(axis=1)])))
+        if typical == 0.0:
+            raise self.failure("it has no stiffness")
+        self._diagonal = np.maximum(nodal, 1e-2 * typical)[:, None]
+        self._inverse = inverse(K, self._masses[:, 0])
 
     def _estimate_diagonal(self, u: Array, start: Array) -> Array:
         """Diagonal of K, mean of a node's axes [N/m], shape (node_count, 1), float64.
