@@ -107,7 +107,7 @@ def begin_crossing(
     """Whether a spring begins where edges a and b cross, from spring `before` or anew; its resting depth [m].
 
     A node at the crossing that lies behind both faces beside the other edge meets one of these by itself if that is
-    about as the edges press. Else that face pushes it aside, and in a one-way contact none presses a node of the master.
+    about as the edges press. Else that face pushes it aside, and in a one-way contact none presses one of the master.
     """
     size = wp.min(slave.size[a], master.size[b])
     if before >= 0:
