@@ -88,6 +88,21 @@ def test_a_crossing_that_slides_over_nodes_goes_on():
     assert abs(moves.force.sum(axis=0)[0]) < 0.03 * abs(moves.force.sum(axis=0)[1])
 
 
+@pytest.mark.parametrize("off", [0.0, 2e-6])  # from the node
+@pytest.mark.parametrize(("one", "other"), [(0, 1), (1, 0), (0, 0)], ids=["master's", "slave's", "both"])
+def test_a_crossing_that_begins_at_a_node_is_as_strong_as_between_nodes(one: int, other: int, off: float):
+    """The node lies behind both faces beside the other edge, so that these alone would push it aside, or nothing."""
+
+    def struck(x: float, z: float):
+        result = result_of(finished(crossed(6, 2, at=(x, z), duration=7e-5)))
+        return result.summary["contacts"][0][0], result.contacts[0].force.sum(axis=0)
+
+    start, impulse = struck(0.0023 * one + off, 0.0023 * other + off)
+    expected, between = struck(0.0023 * one + 1e-4, 0.0023 * other + 1e-4)
+    assert start == expected
+    assert impulse == pytest.approx(between, abs=0.04 * np.linalg.norm(between))
+
+
 def test_an_edge_meets_a_rigid_bar():
     result = result_of(finished(crossed(7, 1, rigid=True)))
     assert result.summary["contacts"][0][0] == pytest.approx(4e-6, abs=1.1e-6)

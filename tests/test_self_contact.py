@@ -1,16 +1,12 @@
 """Tests of self-contact: bodies that fold, crush and mushroom keep out of themselves."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from folds import ALLOY, folded, press
 from impacts import finished, result_of
 
 import warp_mca as mca
-from warp_mca.scenes import taylor_bar
+from benchmarks.self_contact import ALLOY, FOLDED, folded, hairpin, mushroom, press, tube
 
-FOLDED = mca.ContactAll(mu=0.1)
 BALANCE = 0.005  # of the energy at most
 
 
@@ -19,30 +15,14 @@ def through(result: mca.Result) -> bool:
 
 
 def test_a_strip_folds_on_itself() -> None:
-    """A hairpin whose upper arm falls on the lower one, at some 40 m/s."""
-    mesh = folded(arms=2, arm=0.02, bend=0.0025, cell=1e-3)
-    body = mca.Body(name="strip", geometry=mesh, material=ALLOY, kinematics="finite")
-    scene = mca.Scene(
-        name="hairpin",
-        bodies=(body,),
-        gravity=(0.0, -3e5, 0.0),
-        fixed=(
-            mca.Fixed(body="strip", nodes="low", axes="xy"),
-            mca.Fixed(body="strip", nodes="zmin", axes="z"),
-            mca.Fixed(body="strip", nodes="zmax", axes="z"),
-        ),
-        impact=mca.ImpactPhase(duration=4e-4, output_interval=4e-6),
-    )
-    assert through(mca.run(scene))  # and its remedy is general contact
-    result = mca.run(replace(scene, contacts="all"))
+    assert through(mca.run(hairpin(())))  # and its remedy is general contact
+    result = mca.run(hairpin("all"))
     assert result.contacts[0].pressure.max() > 0.0 and not through(result)
     assert result.summary["energy_error"] < BALANCE
 
 
 def test_eight_folds_are_pressed_on_each_other() -> None:
-    mesh = folded(arms=9, arm=0.003, bend=0.9e-3, cell=0.6e-3, around=3, radius=0.006)
-    scene = press(mesh, (FOLDED,), 2.45e-4, 30.0, ("z", "x"))
-    impact = finished(scene)
+    impact = finished(tube())
     item, spring = impact.solver.model.passes[0], impact.state.contacts[0].spring
     touched = np.repeat(item.slave, item.sides)[spring.depth.numpy() > 0.0]
     height = impact.solver.model.X[touched, 1] / 1.8e-3
@@ -54,9 +34,7 @@ def test_eight_folds_are_pressed_on_each_other() -> None:
 
 def test_a_mushrooming_bar_does_not_touch_itself() -> None:
     """Crushed cells at the rim of Taylor's bar are no contact: it moves as it does without."""
-    scene = taylor_bar.build(section=2, ring=1, axial=18, duration=4e-5)
-    scene = replace(scene, impact=replace(scene.impact, output_interval=2e-8))  # less than any stable step
-    alone, kept = mca.run(scene), mca.run(replace(scene, contacts=(*scene.contacts, FOLDED)))
+    alone, kept = (mca.run(mushroom(contacts)) for contacts in ((), (FOLDED,)))
     assert not kept.contacts[1].touched
     assert kept.history["E_plastic"] == pytest.approx(alone.history["E_plastic"], rel=1e-9)
     assert kept.summary["energy_error"] < BALANCE

@@ -104,7 +104,11 @@ def begin_crossing(
     hit: Crossing,
     spring: Spring,
 ):
-    """Whether a spring begins where edges a and b cross, from spring `before` or anew; its resting depth [m]."""
+    """Whether a spring begins where edges a and b cross, from spring `before` or anew; its resting depth [m].
+
+    A node at the crossing that lies behind both faces beside the other edge meets one of these by itself if that is
+    about as the edges press. Else that face pushes it aside, and in a one-way contact none presses one of the master.
+    """
     size = wp.min(slave.size[a], master.size[b])
     if before >= 0:
         pressed = spring.force[before] - spring.tangential[before]
@@ -114,9 +118,10 @@ def begin_crossing(
         return goes_on(-hit.gap, spring.held[before], hit.approach, size), rests
     rest = resting_depth(-hit.gap, hit.approach, size)
     begins = rest >= wp.float64(0.0)
-    if begins:
+    first_touch = hit.amid and rest == wp.float64(0.0)
+    if begins and not first_touch:
         begins = lies_clear(X, u, slave, a, master, b, hit.weight[1], size)
-    if begins:
+    if begins and not first_touch:
         begins = lies_clear(X, u, master, b, slave, a, hit.weight[3], size)
     return begins, rest
 

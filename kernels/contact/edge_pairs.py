@@ -13,6 +13,7 @@ _BEGUN = 2e-3  # depth to which edges may lie in each other when their crossing 
 _MORE = 0.02  # depth by which a crossing that goes on between other edges may be deeper, as a share of an edge
 _NEAR = 0.1  # distance along an edge from a crossing within which an end may meet a face, as a share of an edge
 _CLEAR = 1e-3  # distance in front of a face at which such an end does not, as a share of an edge, at least
+_AMID = 0.1  # of the sine between the faces beside an edge, by which a normal between them lies off either
 _END, _MOST_END = 0.01, 0.5  # shares of an edge by which a crossing that presses may lie off its ends: shallow, deep
 
 
@@ -45,6 +46,7 @@ class Crossing:
     Attributes:
         touches: whether the edges press each other.
         within: whether they do so between their ends.
+        amid: whether the normal is far from those of all faces beside both, so that none bears a node there.
         weight: share of each end of the slave's edge, then of the master's, in its point [-].
         normal: unit normal, out of the master.
         gap: between the points along the normal, negative where the bodies overlap [m].
@@ -54,6 +56,7 @@ class Crossing:
 
     touches: wp.bool
     within: wp.bool
+    amid: wp.bool
     weight: wp.vec4d
     normal: wp.vec3d
     gap: wp.float64
@@ -78,6 +81,13 @@ def lies_between(first: wp.vec3d, second: wp.vec3d, normal: wp.vec3d, outside: w
     enters = wp.dot(wp.cross(first, normal), axis) >= -outside
     leaves = wp.dot(wp.cross(normal, second), axis) >= -outside
     return enters and leaves and wp.dot(normal, first + second) > wp.float64(0.0)
+
+
+@wp.func
+def lies_amid(first: wp.vec3d, second: wp.vec3d, normal: wp.vec3d) -> bool:
+    """Whether a normal across an edge lies well between those of the faces beside it."""
+    most = wp.length(wp.cross(first, second))
+    return lies_between(first, second, normal, wp.float64(-_AMID) * most)
 
 
 @wp.func
@@ -134,6 +144,7 @@ def crossing(
                 if lies_between(own_first, own_second, -n, outside):
                     found.touches = bool(True)
                     found.within = off <= zero
+                    found.amid = lies_amid(first, second, n) and lies_amid(own_first, own_second, -n)
                     found.weight = wp.vec4d(one - s, s, one - t, t)
                     found.normal = n
                     found.gap = gap
