@@ -5,8 +5,8 @@ from __future__ import annotations
 import pickle
 import time
 from collections.abc import Callable, Mapping, Sequence
-from copy import copy
 from dataclasses import replace
+from itertools import count
 
 from warp_mca.base.errors import RequestError
 from warp_mca.base.helpers import Helpers, travel
@@ -17,8 +17,10 @@ from warp_mca.phases.meshing import made_of
 from warp_mca.phases.prepare import Prepared, Request, prepare
 from warp_mca.phases.settings import Settings
 from warp_mca.scene import Scene
+from warp_mca.watch.held import MOST_CELLS as MOST_HELD
+from warp_mca.watch.held import Home, Question, hold, looked_at, parted, tell
 from warp_mca.watch.passing import skins_of
-from warp_mca.watch.row import Finished
+from warp_mca.watch.row import Context, Finished
 from warp_mca.watch.table import told_at_the_end
 
 MOST_CELLS = 200_000  # of a scene for a helper: larger ones fill memory, and a batch has few of them
@@ -26,6 +28,7 @@ STARTING = 3.0  # least work left for which helpers are started; they take a sec
 SENDING = 0.3  # the same where they are there [s]
 MANY = 64  # scenes whose work is more than that, so that helpers begin with the first
 HELPERS = Helpers(__name__)
+_BATCHES = count()  # numbers of those that helpers hold
 
 Wall = dict[str, float]  # seconds by stage
 Answer = tuple[Prepared, Wall]
@@ -85,9 +88,11 @@ def _by_helpers(
     if not pickled:
         return [here(k) for k in range(len(scenes))]
     wall: Wall = {}
+    batch = next(_BATCHES)
 
     def data(k: int) -> bytes:
-        return pickle.dumps((pickled[k], made_of(scenes[k], made), request.span, request.settings), protocol=5)
+        own = (pickled[k], made_of(scenes[k], made), request.span, request.settings, (batch, k), MOST_HELD)
+        return pickle.dumps(own, protocol=5)
 
     def told(k: int, answer: Answer) -> None:
         ready, own = answer
@@ -99,7 +104,11 @@ def _by_helpers(
     answers = HELPERS.carry_out(prepare_one, len(scenes), data, lambda k: (here(k), {}), request.settings.threads, told)
     if any(wall.values()):
         request.clock.share(wall)
-    return [replace(ready, scene=scene) for (ready, _), scene in zip(answers, scenes, strict=True)]
+    found = [replace(ready, scene=scene) for (ready, _), scene in zip(answers, scenes, strict=True)]
+    for k, helper in HELPERS.by.items():
+        if home := found[k].home:
+            found[k] = replace(found[k], home=replace(home, helper=helper))
+    return found
 
 
 def _pickled(scenes: Sequence[Scene]) -> list[bytes]:
@@ -111,41 +120,57 @@ def _pickled(scenes: Sequence[Scene]) -> list[bytes]:
     return found if all(map(travel, found)) else []
 
 
-def prepare_one(scene: bytes, made: dict[object, Mesh], span: float, settings: Settings) -> Answer:
-    """What a helper does: a pickled scene at the start of its impact phase, and wall time by stage [s]."""
+def prepare_one(
+    scene: bytes,
+    made: dict[object, Mesh],
+    span: float,
+    settings: Settings,
+    home: tuple[int, int] = (0, 0),
+    most: int = 0,
+) -> Answer:
+    """What a helper does: a pickled scene at the start of its impact phase, and wall time by stage [s].
+
+    It holds one of no more elements than `most`, where `home` says: number of the batch, and of the scene in it.
+    """
     request = Request(span=span, settings=settings)
     with unchanged():
         ready = prepare(pickle.loads(scene), None, request, made)
+        if ready.model.element_count <= most:
+            own = Context(scene=ready.scene, meshes=ready.meshes, model=ready.model)
+            return replace(ready, home=hold(*home, own, ready.start)), request.clock.wall
         return replace(ready, skins=skins_of(ready.scene, ready.meshes, ready.model)), request.clock.wall
 
 
-def told(finished: Sequence[Finished], before: Sequence[Sequence[str]], threads: int) -> list[tuple[str, ...]]:
+def told(
+    finished: Sequence[Finished], before: Sequence[Sequence[str]], homes: Sequence[Home | None], threads: int
+) -> list[tuple[str, ...]]:
     """What each scene of a batch says of itself, as `told_at_the_end`, by helpers where they are there.
 
     Args:
         finished: the scenes.
         before: what was told of each before.
+        homes: where helpers hold them.
         threads: of the run.
     """
 
     def here(k: int) -> tuple[str, ...]:
-        return told_at_the_end(finished[k], before[k])
+        return told_at_the_end(looked_at(finished[k]) if homes[k] else finished[k], before[k])
 
+    held = [(k, home) for k, home in enumerate(homes) if home]
+    if held:
+        parts = [(parted(finished[k]), before[k]) for k, _ in held]
+        question = Question(tell, [home for _, home in held], parts)
+        found = {k: here(k) for k, home in enumerate(homes) if not home}
+        found |= {k: answer for (k, _), answer in zip(held, question.answers(), strict=True) if answer is not None}
+        return [found[k] if k in found else here(k) for k in range(len(finished))]
     wanted = len(finished) > threads > 2 and HELPERS.count >= threads and not registered()
     if not wanted or not _pickled([item.scene for item in finished]):
         return [here(k) for k in range(len(finished))]
 
     def data(k: int) -> bytes:
-        return pickle.dumps((_to_tell(finished[k]), before[k]), protocol=5)
+        return pickle.dumps((parted(finished[k], at_home=False), before[k]), protocol=5)
 
     return HELPERS.carry_out(tell_one, len(finished), data, here, threads)
-
-
-def _to_tell(finished: Finished) -> Finished:
-    """A scene without the rows of which nothing is told: they are most of its bytes."""
-    ledger = copy(finished.ledger)
-    ledger.kept = replace(ledger.kept, path_stress=[], sensors=[])
-    return replace(finished, ledger=ledger)
 
 
 def tell_one(finished: Finished, before: Sequence[str]) -> tuple[str, ...]:

@@ -86,7 +86,7 @@ class SceneRun:
         tolerance = ready.scene.impact.energy_tolerance
         framed = solver.floating.count > 0
         self.ledger = Ledger(ready.model, steps, tolerance, solver.precision, state.scenes[index], framed)
-        self.looks = SceneLooks(solver, self.ledger, watch, index)
+        self.looks = SceneLooks(solver, self.ledger, watch, index, ready.home)
 
     def read(self, written: int, records: Mapping[str, NDArray]) -> None:
         """Take in the first `written` of the solver's records, and hold them to the guards.

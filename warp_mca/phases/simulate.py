@@ -74,7 +74,9 @@ def simulate(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | Non
             item.outcome(clock.wall, stopped, before=rows_before(item, course.stretches))
             for item, stopped in zip(impact.scene_runs, impact.stopped, strict=True)
         ]
-    warnings = told([finished for _, finished in ended], [item.warnings for item in ready], request.settings.threads)
+    homes = [item.looks.home for item in impact.scene_runs]
+    before = [item.warnings for item in ready]
+    warnings = told([finished for _, finished in ended], before, homes, request.settings.threads)
     return [
         replace(result, warnings=(*own, *said), failed=failed) for (result, _), own in zip(ended, warnings, strict=True)
     ]
