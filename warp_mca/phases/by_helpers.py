@@ -13,12 +13,13 @@ from warp_mca.base.helpers import Helpers, travel
 from warp_mca.base.kept import unchanged
 from warp_mca.base.outside import registered
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.phases.meshing import made_of
+from warp_mca.phases.meshing import Shared
 from warp_mca.phases.prepare import Prepared, Request, prepare
 from warp_mca.phases.settings import Settings
 from warp_mca.scene import Scene
 from warp_mca.watch.held import MOST_CELLS as MOST_HELD
 from warp_mca.watch.held import Home, Question, hold, looked_at, parted, tell
+from warp_mca.watch.mass_report import body_report
 from warp_mca.watch.passing import skins_of
 from warp_mca.watch.row import Context, Finished
 from warp_mca.watch.table import told_at_the_end
@@ -63,7 +64,7 @@ def prepared(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | Non
         begun = time.perf_counter()
         ready.append(here(k))
         if k == 1 and _worth_it(ready, (time.perf_counter() - begun) * (len(scenes) - 2), request.settings, meshes):
-            return [*ready, *_by_helpers(scenes[2:], made, request, lambda k: here(k + 2))]
+            return [*ready, *_by_helpers(scenes[2:], Shared(scenes[:2], made), request, lambda k: here(k + 2))]
     return ready
 
 
@@ -81,7 +82,7 @@ def _may_help(settings: Settings, meshes: object) -> bool:
 
 
 def _by_helpers(
-    scenes: Sequence[Scene], made: Mapping[object, Mesh], request: Request, here: Callable[[int], Prepared]
+    scenes: Sequence[Scene], shared: Shared, request: Request, here: Callable[[int], Prepared]
 ) -> list[Prepared]:
     """Scenes, prepared by helpers where they know all classes of it, or `here`."""
     pickled = _pickled(scenes)
@@ -91,7 +92,7 @@ def _by_helpers(
     batch = next(_BATCHES)
 
     def data(k: int) -> bytes:
-        own = (pickled[k], made_of(scenes[k], made), request.span, request.settings, (batch, k), MOST_HELD)
+        own = (pickled[k], shared.of(scenes[k]), request.span, request.settings, (batch, k), MOST_HELD)
         return pickle.dumps(own, protocol=5)
 
     def told(k: int, answer: Answer) -> None:
@@ -137,6 +138,7 @@ def prepare_one(
         ready = prepare(pickle.loads(scene), None, request, made)
         if ready.model.element_count <= most:
             own = Context(scene=ready.scene, meshes=ready.meshes, model=ready.model)
+            ready = replace(ready, masses=body_report(ready.scene.bodies, ready.meshes, ready.scene.masses))
             return replace(ready, home=hold(*home, own, ready.start)), request.clock.wall
         return replace(ready, skins=skins_of(ready.scene, ready.meshes, ready.model)), request.clock.wall
 

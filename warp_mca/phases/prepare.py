@@ -51,6 +51,7 @@ class Prepared:
         warnings: what is told before the run.
         skins: of its bodies, as `skins_of`; empty where the impact makes them.
         home: where a helper holds it, too; None without one.
+        masses: what `body_report` says of its bodies, where it was computed.
     """
 
     scene: Scene
@@ -62,6 +63,7 @@ class Prepared:
     warnings: tuple[str, ...] = ()
     skins: Sequence[Skin] = ()
     home: Home | None = None
+    masses: Mapping[str, Mapping[str, float | None]] | None = None
 
     def with_model(self, model: Model) -> Prepared:
         """With other passes of contact; it has no home where one is another, or becomes another in the run."""

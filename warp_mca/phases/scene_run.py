@@ -237,7 +237,7 @@ class SceneRun:
     def _bodies(self) -> dict[str, dict[str, Any]]:
         """Mass of each body, and its greatest stress and plastic strain."""
         scene, meshes = self.ready.scene, self.ready.meshes
-        masses = body_report(scene.bodies, meshes, scene.masses)
+        masses = self.ready.masses or body_report(scene.bodies, meshes, scene.masses)
         peaks = peak_report(scene, meshes, self.solver, self.state, self.index, self.steps)
         return {name: {**masses[name], **peaks.get(name, {})} for name in masses}
 

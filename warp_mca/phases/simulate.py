@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from warp_mca.base.garbage import few_collections
 from warp_mca.geometry.mesh import Mesh
 from warp_mca.phases.by_helpers import prepared, told
 from warp_mca.phases.carry_out import Course, begin
@@ -17,6 +18,7 @@ from warp_mca.scene import Scene
 from warp_mca.system.reading import read_once
 
 
+@few_collections()
 def simulate(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | None, request: Request) -> list[Result]:
     """Run scenes side by side.
 
