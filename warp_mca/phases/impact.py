@@ -239,14 +239,18 @@ class Impact:
         """Hand over what is held of a batch; raises as `read`."""
         held, self._held = self._held, []
         if held:
-            joined = {name: np.concatenate([item[name] for item in held]) for name in held[0] if name != "flag"}
-            self._hand_over(len(joined["partial"]), joined | {"flag": held[-1]["flag"]})
+            names = held[0].keys() - {"flag", "path_stress"}
+            joined = {name: np.concatenate([item[name] for item in held]) for name in names}
+            stress = [item["path_stress"] for item in held if "path_stress" in item]
+            self._hand_over(len(joined["partial"]), joined | {"flag": held[-1]["flag"]}, stress)
 
-    def _hand_over(self, written: int, records: Mapping[str, NDArray]) -> None:
+    def _hand_over(
+        self, written: int, records: Mapping[str, NDArray], stress: Sequence[NDArray[np.float32]] = ()
+    ) -> None:
         for k, scene_run in enumerate(self.scene_runs):
             if self.stopped[k] is None:
                 try:
-                    scene_run.read(written, records)
+                    scene_run.read(written, records, stress)
                 except GuardError as error:
                     self.stopped[k] = str(error)
                     if None not in self.stopped:
