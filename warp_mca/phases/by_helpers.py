@@ -9,7 +9,7 @@ from dataclasses import replace
 from itertools import count
 
 from warp_mca.base.errors import RequestError
-from warp_mca.base.helpers import Helpers, travel
+from warp_mca.base.helpers import Helper, Helpers, travel
 from warp_mca.base.kept import unchanged
 from warp_mca.base.outside import registered
 from warp_mca.geometry.mesh import Mesh
@@ -143,36 +143,59 @@ def prepare_one(
         return replace(ready, skins=skins_of(ready.scene, ready.meshes, ready.model)), request.clock.wall
 
 
-def told(
-    finished: Sequence[Finished], before: Sequence[Sequence[str]], homes: Sequence[Home | None], threads: int
-) -> list[tuple[str, ...]]:
-    """What each scene of a batch says of itself, as `told_at_the_end`, by helpers where they are there.
+class Telling:
+    """What scenes of a batch say of themselves, as `told_at_the_end`, by helpers where they are there.
 
-    Args:
-        finished: the scenes.
-        before: what was told of each before.
-        homes: where helpers hold them.
-        threads: of the run.
+    Attributes:
+        order: numbers of the scenes, those that one helper holds after each other, so that it begins with them while
+            this process computes what comes of the next.
     """
 
-    def here(k: int) -> tuple[str, ...]:
-        return told_at_the_end(looked_at(finished[k]) if homes[k] else finished[k], before[k])
+    def __init__(self, before: Sequence[Sequence[str]], homes: Sequence[Home | None], threads: int) -> None:
+        """What was told of each scene before, where helpers hold them, and threads of the run."""
+        self._before, self._homes, self._threads = before, homes, threads
+        self._left: dict[Helper | None, list[int]] = {}
+        for k, home in enumerate(homes):
+            self._left.setdefault(home.helper if home else None, []).append(k)
+        last = self._left.pop(None, [])
+        self.order = [k for own in self._left.values() for k in own] + last
+        self._finished: dict[int, Finished] = {}
+        self._asked: list[tuple[list[int], Question]] = []
 
-    held = [(k, home) for k, home in enumerate(homes) if home]
-    if held:
-        parts = [(parted(finished[k]), before[k]) for k, _ in held]
-        question = Question(tell, [home for _, home in held], parts)
-        found = {k: here(k) for k, home in enumerate(homes) if not home}
-        found |= {k: answer for (k, _), answer in zip(held, question.answers(), strict=True) if answer is not None}
-        return [found[k] if k in found else here(k) for k in range(len(finished))]
-    wanted = len(finished) > threads > 2 and HELPERS.count >= threads and not registered()
-    if not wanted or not _pickled([item.scene for item in finished]):
-        return [here(k) for k in range(len(finished))]
+    def take(self, k: int, finished: Finished) -> None:
+        """Take a scene, and ask its helper if it was the last of those there."""
+        self._finished[k], home = finished, self._homes[k]
+        if not home:
+            return
+        own = self._left[home.helper]
+        if own[-1] == k:
+            parts = [(parted(self._finished[i]), self._before[i]) for i in own]
+            self._asked.append((own, Question(tell, [item for i in own if (item := self._homes[i])], parts)))
 
-    def data(k: int) -> bytes:
-        return pickle.dumps((parted(finished[k], at_home=False), before[k]), protocol=5)
+    def told(self) -> list[tuple[str, ...]]:
+        """Of all scenes, which were taken."""
+        if not self._asked:
+            return self._by_any()
+        found = {k: self._here(k) for k, home in enumerate(self._homes) if not home}
+        for own, question in self._asked:
+            found |= {k: answer for k, answer in zip(own, question.answers(), strict=True) if answer is not None}
+        return [found[k] if k in found else self._here(k) for k in range(len(self._homes))]
 
-    return HELPERS.carry_out(tell_one, len(finished), data, here, threads)
+    def _here(self, k: int) -> tuple[str, ...]:
+        own = self._finished[k]
+        return told_at_the_end(looked_at(own) if self._homes[k] else own, self._before[k])
+
+    def _by_any(self) -> list[tuple[str, ...]]:
+        """By helpers that hold none, or this process in turn."""
+        finished = [self._finished[k] for k in range(len(self._homes))]
+        wanted = len(finished) > self._threads > 2 and HELPERS.count >= self._threads and not registered()
+        if not wanted or not _pickled([item.scene for item in finished]):
+            return [self._here(k) for k in range(len(finished))]
+
+        def data(k: int) -> bytes:
+            return pickle.dumps((parted(finished[k], at_home=False), self._before[k]), protocol=5)
+
+        return HELPERS.carry_out(tell_one, len(finished), data, self._here, self._threads)
 
 
 def tell_one(finished: Finished, before: Sequence[str]) -> tuple[str, ...]:
