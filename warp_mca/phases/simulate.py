@@ -60,6 +60,7 @@ def simulate(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | Non
         tell("impact", impact.rows / (impact.steps.intervals + 1))
 
     course, done = Course(impact, request), False
+    tell("impact", 0.0)
     try:
         course.run(lone.scene.phases, seen, tell=lambda share: tell("impact", share), opening=opening)
         done = True
