@@ -31,7 +31,7 @@ class Home:
 
     Attributes:
         number: under which its helper has it.
-        nodes: of its skins, as `Watch.nodes`.
+        nodes: of its skins, as `Watch.nodes`, shape (node_count,), int32.
         helper: that holds it; None on the way from there.
     """
 
