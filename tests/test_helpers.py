@@ -11,10 +11,11 @@ from helper_jobs import place_of
 
 import warp_mca as mca
 from warp_mca.base import outside
-from warp_mca.base.helpers import Helpers, travel
+from warp_mca.base.helpers import Helper, Helpers, travel
 from warp_mca.phases import by_helpers, prepare
 from warp_mca.phases.settings import Settings
 from warp_mca.system.state import digest
+from warp_mca.watch import held, looks
 from warp_mca.watch.passing import DEPTH, Watch, skins_of
 
 THREADS = 3  # the least that have helpers
@@ -29,7 +30,7 @@ def helpers():
 
 @pytest.fixture
 def at_once(monkeypatch):
-    """Helpers begin whatever they save; yields which scenes they prepared, and whether they told of scenes."""
+    """Helpers begin whatever they save; yields which scenes they prepared, and what they did for all that they hold."""
     prepared = []
     carry_out = by_helpers.HELPERS.carry_out
 
@@ -39,6 +40,18 @@ def at_once(monkeypatch):
             return carry_out(function, jobs, data, no_one, count)
         return carry_out(function, jobs, data, here, count, lambda k, a: (told(k, a), a[1] and prepared.append(k)))
 
+    class Counted(held.Question):
+        def __init__(self, function, homes, *more):
+            super().__init__(function, homes, *more)
+            self.name = function.__name__ if homes else ""
+
+        def answers(self):
+            found = super().answers()
+            prepared.append("lost" if any(item is None for item in found) else self.name)
+            return found
+
+    monkeypatch.setattr(by_helpers, "Question", Counted)
+    monkeypatch.setattr(looks, "Question", Counted)
     monkeypatch.setattr(outside, "_REGISTERED", [])  # by other tests
     monkeypatch.setattr(by_helpers, "STARTING", -1.0)
     monkeypatch.setattr(by_helpers, "SENDING", -1.0)
@@ -143,19 +156,35 @@ def no_one(number: int) -> None:
     raise AssertionError(f"helpers do not tell of scene {number}")
 
 
-def test_helpers_tell_the_same(at_once):
-    """Of boxes that pass through each other and spin."""
+@pytest.mark.parametrize("most", [0, held.MOST_CELLS], ids=["sent to any", "held by theirs"])
+def test_helpers_see_and_tell_the_same(at_once, monkeypatch, most):
+    """Of boxes that pass through each other and spin; so where helpers hold scenes, and where these are lost."""
+    monkeypatch.setattr(by_helpers, "MOST_HELD", most)
     metal, box = mca.Elastic(E=2e9, nu=0.3, rho=1000.0), mca.Box(size=(0.01, 0.01, 0.01), divisions=(1, 1, 1))
-    low = mca.Body(name="low", geometry=box, material=metal, angular_velocity=(0.0, 50.0, 0.0))
+    low = mca.Body(name="low", geometry=box, material=metal, element="hex8", angular_velocity=(0.0, 50.0, 0.0))
     high = mca.Body(
         name="high", geometry=box, material=metal, position=(0.001, 0.0102, 0.0), velocity=(0.0, -30.0, 0.0)
     )
     scene = mca.Scene(name="pair", bodies=(low, high), impact=mca.ImpactPhase(duration=1e-4, output_interval=1e-5))
     alone = mca.run(scene, threads=2)
     assert any("no contact keeps" in said for said in alone.warnings) and len(alone.warnings) > 1
-    while "told" not in at_once:
+    wanted = {"look_at_bending", "look_at_skins", "tell"} if most else {"told"}
+    for _ in range(12):
+        if wanted <= set(at_once):
+            break
         results = mca.run_batch([scene] * (THREADS + 2), threads=THREADS)
-    assert {result.warnings for result in results} == {alone.warnings}
+        assert {result.warnings for result in results} == {alone.warnings}
+    assert wanted <= set(at_once) and "lost" not in at_once
+    ask = Helper.ask
+
+    def lost(helper, *more):
+        helper.process.kill()
+        helper.process.wait()
+        return ask(helper, *more)
+
+    monkeypatch.setattr(Helper, "ask", lost)
+    results = mca.run_batch([scene] * (THREADS + 2), threads=THREADS)
+    assert {result.warnings for result in results} == {alone.warnings} and ("lost" in at_once) == bool(most)
 
 
 def test_errors_of_a_batch_name_the_first_scene(at_once):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import fcntl
 import io
 import os
 import pickle
@@ -17,15 +18,16 @@ from typing import Any, TypeVar
 
 T = TypeVar("T")
 _PROGRAM = Path(__file__).with_name("helper.py")
+ROOM = 1 << 20  # of a pipe [byte]
 _OWN = ("warp_mca.", "numpy.", "builtins.", "pathlib.")  # where classes are that a helper knows
 
 
-class _LostError(Exception):
-    """A helper ended."""
+class LostError(Exception):
+    """A helper ended, or could not do what it was asked."""
 
 
-class _Helper:
-    """One process, which has one job at a time; the first is to begin."""
+class Helper:
+    """One process, which does its jobs in turn; the first is to begin."""
 
     def __init__(self, modules: Sequence[str]) -> None:
         command = [sys.executable, "-P", str(_PROGRAM)]
@@ -36,7 +38,10 @@ class _Helper:
         )
         assert self.process.stdin is not None and self.process.stdout is not None
         self._to, self._from = self.process.stdin, self.process.stdout
+        for pipe in (self._to, self._from):
+            _widen(pipe.fileno())
         self.begun = False
+        self._asked, self._next, self._answers = 0, 0, dict[int, Any]()
         self.send(pickle.dumps(sys.path) + pickle.dumps(tuple(modules)))
 
     def fileno(self) -> int:
@@ -48,15 +53,44 @@ class _Helper:
         try:
             self._to.write(job)
             self._to.flush()
-        except OSError as error:
-            raise _LostError from error
+        except (OSError, ValueError) as error:  # it is gone, or was ended here
+            raise LostError from error
 
     def answer(self) -> Any:
         """Of the job."""
         try:
             return pickle.load(self._from)
-        except (EOFError, OSError, pickle.UnpicklingError) as error:
-            raise _LostError from error
+        except (EOFError, OSError, ValueError, pickle.UnpicklingError) as error:
+            raise LostError from error
+
+    @property
+    def owes(self) -> bool:
+        """Whether answers to `ask` were not taken."""
+        return self._next < self._asked
+
+    def ask(self, function: Callable[..., Any], *args: Any) -> int:
+        """Let it call a function of the package while this process goes on; the number under which it answers.
+
+        Raises:
+            LostError: it has ended.
+        """
+        self.send(message(function, pickle.dumps(args, protocol=pickle.HIGHEST_PROTOCOL)))
+        self._asked += 1
+        return self._asked - 1
+
+    def told(self, number: int) -> Any:
+        """Wait for what a function returned.
+
+        Raises:
+            LostError: it has ended, or the function raised an error.
+        """
+        while self._next <= number:
+            self._answers[self._next] = self.answer()
+            self._next += 1
+        done, found = self._answers.pop(number)
+        if not done:
+            raise LostError
+        return found
 
     def end(self) -> None:
         """Kill it, whatever it is doing."""
@@ -72,12 +106,16 @@ class Helpers:
 
     They know the package and NumPy. Scenes of other classes, and those of a process that registered kinds of its own,
     are not for them.
+
+    Attributes:
+        by: which of them did each job of the latest call of `carry_out`; those of this process are not there.
     """
 
     def __init__(self, *modules: str) -> None:
         """None yet; each imports these modules first."""
         self._modules = modules
-        self._all: list[_Helper] = []
+        self._all: list[Helper] = []
+        self.by: dict[int, Helper] = {}
         self._where: object = None
         self._owner = os.getpid()
         atexit.register(self.end)
@@ -115,11 +153,9 @@ class Helpers:
             Exception: what `here` raises for the first of the jobs that fail.
         """
 
-        def message(k: int) -> bytes:
-            return pickle.dumps((function.__module__, function.__qualname__, data(k)))
-
+        self.by = {}
         try:
-            answers = self._answers(jobs, message, here, count, told)
+            answers = self._answers(jobs, lambda k: message(function, data(k)), here, count, told)
         except BaseException:
             self.end()
             raise
@@ -141,7 +177,7 @@ class Helpers:
     ) -> dict[int, T]:
         self.begin(count)
         left, answers = deque(range(jobs)), {}
-        busy: dict[_Helper, int | None] = {helper: None for helper in self._all if not helper.begun}
+        busy: dict[Helper, int | None] = {helper: None for helper in self._all if not helper.begun}
         for helper in [helper for helper in self._all if helper.begun]:
             self._next(helper, message, left, busy)
         while left or any(k is not None for k in busy.values()):
@@ -152,10 +188,10 @@ class Helpers:
                     found = helper.answer()
                     helper.begun = True
                     if k is not None and found[0]:
-                        answers[k] = found[1]
+                        answers[k], self.by[k] = found[1], helper
                         told(k, found[1])
                     self._next(helper, message, left, busy)
-                except _LostError:
+                except LostError:
                     self._lose(helper)
                     left.extend(() if k is None else (k,))
             if left and not any(helper.begun for helper in busy):
@@ -170,29 +206,40 @@ class Helpers:
         if self._where != _surroundings():
             self.end()
         self._where = _surroundings()
-        for helper in [helper for helper in self._all if helper.process.poll() is not None]:
-            self._lose(helper)
-        with suppress(OSError, _LostError):
+        for helper in [helper for helper in self._all if helper.process.poll() is not None or helper.owes]:
+            self._lose(helper)  # also one that was left in the middle of what it was asked
+        with suppress(OSError, LostError):
             while len(self._all) < count:
-                self._all.append(_Helper(self._modules))
+                self._all.append(Helper(self._modules))
 
     def _next(
-        self, helper: _Helper, message: Callable[[int], bytes], left: deque[int], busy: dict[_Helper, int | None]
+        self, helper: Helper, message: Callable[[int], bytes], left: deque[int], busy: dict[Helper, int | None]
     ) -> None:
         if not left:
             return
         k = left.popleft()
         try:
             helper.send(message(k))
-        except _LostError:
+        except LostError:
             self._lose(helper)
             left.append(k)
         else:
             busy[helper] = k
 
-    def _lose(self, helper: _Helper) -> None:
+    def _lose(self, helper: Helper) -> None:
         helper.end()
         self._all.remove(helper)
+
+
+def message(function: Callable[..., Any], data: bytes) -> bytes:
+    """A job as a helper takes it: a function of the package, and a pickled tuple of its arguments."""
+    return pickle.dumps((function.__module__, function.__qualname__, data), protocol=pickle.HIGHEST_PROTOCOL)
+
+
+def _widen(pipe: int) -> None:
+    """Let a pipe hold more at once, where the system can: a reader that is busy otherwise stops the writer."""
+    with suppress(OSError, AttributeError):
+        fcntl.fcntl(pipe, fcntl.F_SETPIPE_SZ, ROOM)
 
 
 def travel(data: bytes) -> bool:

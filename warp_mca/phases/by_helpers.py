@@ -5,20 +5,23 @@ from __future__ import annotations
 import pickle
 import time
 from collections.abc import Callable, Mapping, Sequence
-from copy import copy
 from dataclasses import replace
+from itertools import count
 
 from warp_mca.base.errors import RequestError
-from warp_mca.base.helpers import Helpers, travel
+from warp_mca.base.helpers import Helper, Helpers, travel
 from warp_mca.base.kept import unchanged
 from warp_mca.base.outside import registered
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.phases.meshing import made_of
+from warp_mca.phases.meshing import Shared
 from warp_mca.phases.prepare import Prepared, Request, prepare
 from warp_mca.phases.settings import Settings
 from warp_mca.scene import Scene
+from warp_mca.watch.held import MOST_CELLS as MOST_HELD
+from warp_mca.watch.held import Home, Question, hold, looked_at, parted, tell
+from warp_mca.watch.mass_report import body_report
 from warp_mca.watch.passing import skins_of
-from warp_mca.watch.row import Finished
+from warp_mca.watch.row import Context, Finished
 from warp_mca.watch.table import told_at_the_end
 
 MOST_CELLS = 200_000  # of a scene for a helper: larger ones fill memory, and a batch has few of them
@@ -26,6 +29,7 @@ STARTING = 3.0  # least work left for which helpers are started; they take a sec
 SENDING = 0.3  # the same where they are there [s]
 MANY = 64  # scenes whose work is more than that, so that helpers begin with the first
 HELPERS = Helpers(__name__)
+_BATCHES = count()  # numbers of those that helpers hold
 
 Wall = dict[str, float]  # seconds by stage
 Answer = tuple[Prepared, Wall]
@@ -60,7 +64,7 @@ def prepared(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | Non
         begun = time.perf_counter()
         ready.append(here(k))
         if k == 1 and _worth_it(ready, (time.perf_counter() - begun) * (len(scenes) - 2), request.settings, meshes):
-            return [*ready, *_by_helpers(scenes[2:], made, request, lambda k: here(k + 2))]
+            return [*ready, *_by_helpers(scenes[2:], Shared(scenes[:2], made), request, lambda k: here(k + 2))]
     return ready
 
 
@@ -78,16 +82,18 @@ def _may_help(settings: Settings, meshes: object) -> bool:
 
 
 def _by_helpers(
-    scenes: Sequence[Scene], made: Mapping[object, Mesh], request: Request, here: Callable[[int], Prepared]
+    scenes: Sequence[Scene], shared: Shared, request: Request, here: Callable[[int], Prepared]
 ) -> list[Prepared]:
     """Scenes, prepared by helpers where they know all classes of it, or `here`."""
     pickled = _pickled(scenes)
     if not pickled:
         return [here(k) for k in range(len(scenes))]
     wall: Wall = {}
+    batch = next(_BATCHES)
 
     def data(k: int) -> bytes:
-        return pickle.dumps((pickled[k], made_of(scenes[k], made), request.span, request.settings), protocol=5)
+        own = (pickled[k], shared.of(scenes[k]), request.span, request.settings, (batch, k), MOST_HELD)
+        return pickle.dumps(own, protocol=5)
 
     def told(k: int, answer: Answer) -> None:
         ready, own = answer
@@ -99,7 +105,11 @@ def _by_helpers(
     answers = HELPERS.carry_out(prepare_one, len(scenes), data, lambda k: (here(k), {}), request.settings.threads, told)
     if any(wall.values()):
         request.clock.share(wall)
-    return [replace(ready, scene=scene) for (ready, _), scene in zip(answers, scenes, strict=True)]
+    found = [replace(ready, scene=scene) for (ready, _), scene in zip(answers, scenes, strict=True)]
+    for k, helper in HELPERS.by.items():
+        if home := found[k].home:
+            found[k] = replace(found[k], home=replace(home, helper=helper))
+    return found
 
 
 def _pickled(scenes: Sequence[Scene]) -> list[bytes]:
@@ -111,41 +121,81 @@ def _pickled(scenes: Sequence[Scene]) -> list[bytes]:
     return found if all(map(travel, found)) else []
 
 
-def prepare_one(scene: bytes, made: dict[object, Mesh], span: float, settings: Settings) -> Answer:
-    """What a helper does: a pickled scene at the start of its impact phase, and wall time by stage [s]."""
+def prepare_one(
+    scene: bytes,
+    made: dict[object, Mesh],
+    span: float,
+    settings: Settings,
+    home: tuple[int, int] = (0, 0),
+    most: int = 0,
+) -> Answer:
+    """What a helper does: a pickled scene at the start of its impact phase, and wall time by stage [s].
+
+    It holds one of no more elements than `most`, where `home` says: number of the batch, and of the scene in it.
+    """
     request = Request(span=span, settings=settings)
     with unchanged():
         ready = prepare(pickle.loads(scene), None, request, made)
+        if ready.model.element_count <= most:
+            own = Context(scene=ready.scene, meshes=ready.meshes, model=ready.model)
+            ready = replace(ready, masses=body_report(ready.scene.bodies, ready.meshes, ready.scene.masses))
+            return replace(ready, home=hold(*home, own, ready.start)), request.clock.wall
         return replace(ready, skins=skins_of(ready.scene, ready.meshes, ready.model)), request.clock.wall
 
 
-def told(finished: Sequence[Finished], before: Sequence[Sequence[str]], threads: int) -> list[tuple[str, ...]]:
-    """What each scene of a batch says of itself, as `told_at_the_end`, by helpers where they are there.
+class Telling:
+    """What scenes of a batch say of themselves, as `told_at_the_end`, by helpers where they are there.
 
-    Args:
-        finished: the scenes.
-        before: what was told of each before.
-        threads: of the run.
+    Attributes:
+        order: numbers of the scenes, those that one helper holds after each other, so that it begins with them while
+            this process computes what comes of the next.
     """
 
-    def here(k: int) -> tuple[str, ...]:
-        return told_at_the_end(finished[k], before[k])
+    def __init__(self, before: Sequence[Sequence[str]], homes: Sequence[Home | None], threads: int) -> None:
+        """What was told of each scene before, where helpers hold them, and threads of the run."""
+        self._before, self._homes, self._threads = before, homes, threads
+        self._left: dict[Helper | None, list[int]] = {}
+        for k, home in enumerate(homes):
+            self._left.setdefault(home.helper if home else None, []).append(k)
+        last = self._left.pop(None, [])
+        self.order = [k for own in self._left.values() for k in own] + last
+        self._finished: dict[int, Finished] = {}
+        self._asked: list[tuple[list[int], Question]] = []
 
-    wanted = len(finished) > threads > 2 and HELPERS.count >= threads and not registered()
-    if not wanted or not _pickled([item.scene for item in finished]):
-        return [here(k) for k in range(len(finished))]
+    def take(self, k: int, finished: Finished) -> None:
+        """Take a scene, and ask its helper if it was the last of those there."""
+        self._finished[k], home = finished, self._homes[k]
+        if not home:
+            return
+        own = self._left[home.helper]
+        if own[-1] == k:
+            parts = [(parted(self._finished[i]), self._before[i]) for i in own]
+            self._asked.append((own, Question(tell, [item for i in own if (item := self._homes[i])], parts)))
 
-    def data(k: int) -> bytes:
-        return pickle.dumps((_to_tell(finished[k]), before[k]), protocol=5)
+    def told(self) -> list[tuple[str, ...]]:
+        """Of all scenes, which were taken."""
+        if not self._asked:
+            return self._by_any()
+        found = {k: self._here(k) for k, home in enumerate(self._homes) if not home}
+        for own, question in self._asked:
+            found |= {k: answer for k, answer in zip(own, question.answers(), strict=True) if answer is not None}
+        return [found[k] if k in found else self._here(k) for k in range(len(self._homes))]
 
-    return HELPERS.carry_out(tell_one, len(finished), data, here, threads)
+    def _here(self, k: int) -> tuple[str, ...]:
+        own = self._finished[k]
+        return told_at_the_end(looked_at(own) if self._homes[k] else own, self._before[k])
 
+    def _by_any(self) -> list[tuple[str, ...]]:
+        """By helpers that hold none, or this process in turn."""
+        finished = [self._finished[k] for k in range(len(self._homes))]
+        wanted = len(finished) > self._threads > 2 and HELPERS.count >= self._threads and not registered()
+        if not wanted or not _pickled([item.scene for item in finished]):
+            return [self._here(k) for k in range(len(finished))]
 
-def _to_tell(finished: Finished) -> Finished:
-    """A scene without the rows of which nothing is told: they are most of its bytes."""
-    ledger = copy(finished.ledger)
-    ledger.kept = replace(ledger.kept, path_stress=[], sensors=[])
-    return replace(finished, ledger=ledger)
+        def data(k: int) -> bytes:
+            return pickle.dumps((parted(finished[k], at_home=False), self._before[k]), protocol=5)
+
+        return HELPERS.carry_out(tell_one, len(finished), data, self._here, self._threads)
 
 
 def tell_one(finished: Finished, before: Sequence[str]) -> tuple[str, ...]:

@@ -64,8 +64,8 @@ def joined(scene: Scene, probes: Probes | None, parts: Sequence[Rows]) -> dict[s
     known = [part.contacts or _open(scene, count) for part, count in zip(parts, counts, strict=True)]
     stress = []
     for part, count in zip(parts, counts, strict=True) if probes else ():
-        unknown = np.full((count, len(probes.corner) if probes else 0, 6), np.nan, dtype=np.float32)
-        stress += part.path_stress or [unknown]
+        shape = count, len(probes.corner) if probes else 0, 6
+        stress += part.path_stress or [np.full(shape, np.nan, dtype=np.float32)]
     seen, cut = sensor_histories(scene, history["time_s"], [row for part in parts for row in part.sensors])
     contacts = tuple(_one_contact(own) for own in zip(*known, strict=True))
     paths = path_histories(probes, stress) if probes else ()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -52,6 +51,7 @@ class Impact:
 
     Attributes:
         ready: the scenes at its start.
+        span: simulated time that was asked for [s].
         steps: how it is divided.
         solver: that advances it.
         state: all that changes.
@@ -88,7 +88,7 @@ class Impact:
             RequestError: steps cannot be chosen, or bodies overlap that must not.
         """
         alike = with_alike_passes([item.model for item in ready])
-        ready = [replace(item, model=model) for item, model in zip(ready, alike, strict=True)]
+        ready = [item.with_model(model) for item, model in zip(ready, alike, strict=True)]
         self.ready = tuple(ready)
         self.steps = divide_alike([(item.scene, item.model) for item in ready], span)
         model = join_models([item.model for item in ready])
@@ -113,18 +113,26 @@ class Impact:
         self.recording: Recording | None = None
         self._held: list[dict[str, NDArray]] = []
         self._sets = 1  # so that scenes that break at once end the run at once
-        self._watches = [Watch(item.scene, item.meshes, item.model, self.solver.dt, span, item.skins) for item in ready]
+        self.span = span
+        self._watches = [
+            Watch(k.scene, k.meshes, k.model, self.solver.dt, span, k.skins, k.home.nodes if k.home else None)
+            for k in ready
+        ]
         self._begin_scenes()
 
     @cached_property
     def together(self) -> Together:
-        """Cells of several scenes whose bending is looked at."""
-        return Together([(item.ledger.model, item.looks.samples) for item in self.scene_runs])
+        """Cells of several scenes whose bending this process looks at."""
+        return Together(
+            [(item.ledger.model, () if item.looks.home else item.looks.samples) for item in self.scene_runs]
+        )
 
     def look_at_the_end(self) -> None:
-        """Look at the bending of all scenes of a batch, for their results; a lone one looks itself."""
+        """Look at the bending of the scenes of a batch, for their results; a lone one and helpers look themselves."""
         looks = [item.looks for item in self.scene_runs]
-        if len(looks) > 1 and any(item.samples for item in looks):
+        for item in looks:
+            item.last = item.ledger.kept.stiffened if item.home else None
+        if len(looks) > 1 and any(item.samples for item in looks if not item.home):
             before = [item.ledger.kept.stiffened for item in looks]
             u = np.asarray(on_host(self.state.u), dtype=np.float64)
             for item, found in zip(looks, self.together.seen(u, before), strict=True):
@@ -231,14 +239,18 @@ class Impact:
         """Hand over what is held of a batch; raises as `read`."""
         held, self._held = self._held, []
         if held:
-            joined = {name: np.concatenate([item[name] for item in held]) for name in held[0] if name != "flag"}
-            self._hand_over(len(joined["partial"]), joined | {"flag": held[-1]["flag"]})
+            names = held[0].keys() - {"flag", "path_stress"}
+            joined = {name: np.concatenate([item[name] for item in held]) for name in names}
+            stress = [item["path_stress"] for item in held if "path_stress" in item]
+            self._hand_over(len(joined["partial"]), joined | {"flag": held[-1]["flag"]}, stress)
 
-    def _hand_over(self, written: int, records: Mapping[str, NDArray]) -> None:
+    def _hand_over(
+        self, written: int, records: Mapping[str, NDArray], stress: Sequence[NDArray[np.float32]] = ()
+    ) -> None:
         for k, scene_run in enumerate(self.scene_runs):
             if self.stopped[k] is None:
                 try:
-                    scene_run.read(written, records)
+                    scene_run.read(written, records, stress)
                 except GuardError as error:
                     self.stopped[k] = str(error)
                     if None not in self.stopped:

@@ -108,7 +108,7 @@ class Loop:
 
     def _looks(self) -> Looks:
         looks = [item.looks for item in self.impact.scene_runs]
-        return Looks(self.solver, self.state, looks, lambda: self.impact.together)
+        return Looks(self.solver, self.state, looks, lambda: self.impact.together, self.impact.span)
 
     def _record(self, count: int, row: int | None, searches: bool = False) -> None:
         """Record and step; `row` is the number of the row of the history that the record gives, if it gives one."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from itertools import islice
 
@@ -76,10 +76,22 @@ def mesh(
     return cut
 
 
-def made_of(scene: Scene, made: Mapping[object, Mesh]) -> dict[object, Mesh]:
-    """Those of the meshes by recipe that a scene's bodies have."""
-    keys = {_key(_geometry(scene, body)) for body in scene.bodies}
-    return {key: made[key] for key in keys if key in made and not isinstance(key, _Itself)}
+class Shared:
+    """Meshes that were made, for bodies of other scenes with equal recipes."""
+
+    def __init__(self, scenes: Sequence[Scene], made: Mapping[object, Mesh]) -> None:
+        """Those of the scenes, `made` as `mesh` gives it."""
+        self._found: dict[object, tuple[object, Mesh]] = {}
+        for scene in scenes:
+            for body in scene.bodies:
+                key = _key(_geometry(scene, body))
+                if key in made and not isinstance(key, _Itself):
+                    self._found[scene.refine, _key(body.geometry)] = key, made[key]
+
+    def of(self, scene: Scene) -> dict[object, Mesh]:
+        """Those of a scene's bodies, by recipe."""
+        keys = [(scene.refine, _key(body.geometry)) for body in scene.bodies]
+        return dict(self._found[key] for key in keys if key in self._found)
 
 
 def _check_set(field: str, body: str, name: str, mesh: Mesh, covers: bool) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from warp_mca.phases.checkpoint import Checkpoint
     from warp_mca.phases.motion import Motion
     from warp_mca.recorders.recorder import Recorder
+    from warp_mca.watch.held import Home
     from warp_mca.watch.skins import Skin
 
 
@@ -49,6 +50,8 @@ class Prepared:
         sensors: its probes and sections.
         warnings: what is told before the run.
         skins: of its bodies, as `skins_of`; empty where the impact makes them.
+        home: where a helper holds it, too; None without one.
+        masses: what `body_report` says of its bodies, where it was computed.
     """
 
     scene: Scene
@@ -59,6 +62,14 @@ class Prepared:
     sensors: Sensors = NO_SENSORS
     warnings: tuple[str, ...] = ()
     skins: Sequence[Skin] = ()
+    home: Home | None = None
+    masses: Mapping[str, Mapping[str, float | None]] | None = None
+
+    def with_model(self, model: Model) -> Prepared:
+        """With other passes of contact; it has no home where one is another, or becomes another in the run."""
+        passes = [id(item) for item in self.model.passes]
+        same = passes == [id(item) for item in model.passes] and not model.fails
+        return replace(self, model=model, home=self.home if same else None)
 
 
 @dataclass

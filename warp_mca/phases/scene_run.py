@@ -30,6 +30,7 @@ from warp_mca.step.state_figures import (
     rigid_extremes,
 )
 from warp_mca.system.reading import on_host
+from warp_mca.system.records import parts_of
 from warp_mca.watch.energy import spring_shares
 from warp_mca.watch.failure_report import failure_report
 from warp_mca.watch.ledger import Ledger
@@ -86,10 +87,10 @@ class SceneRun:
         tolerance = ready.scene.impact.energy_tolerance
         framed = solver.floating.count > 0
         self.ledger = Ledger(ready.model, steps, tolerance, solver.precision, state.scenes[index], framed)
-        self.looks = SceneLooks(solver, self.ledger, watch, index)
+        self.looks = SceneLooks(solver, self.ledger, watch, index, ready.home)
 
-    def read(self, written: int, records: Mapping[str, NDArray]) -> None:
-        """Take in the first `written` of the solver's records, and hold them to the guards.
+    def read(self, written: int, records: Mapping[str, NDArray], stress: Sequence[NDArray[np.float32]] = ()) -> None:
+        """Take in the first `written` of the solver's records, `path_stress` in lasting parts if not among them.
 
         Raises:
             GuardError: a record breaks a guard; those before it count.
@@ -98,10 +99,12 @@ class SceneRun:
         try:
             self.ledger.read(written, self.solver.layout.records(records, self.index))
         finally:
+            good = rows[: kept.count - first]
             if len(self.ready.probes.corner):
-                kept.path_stress.append(records["path_stress"][rows[: kept.count - first], self.probes])
+                own = parts_of(stress, good, self.steps.checks) if stress else [records["path_stress"][good]]
+                kept.path_stress += [part[:, self.probes] for part in own]
             if self.ready.sensors.channels:
-                kept.sensors.extend(records["sensors"][rows[: kept.count - first], self.channels])
+                kept.sensors.extend(records["sensors"][good, self.channels])
 
     def history(self, first: int = 0) -> dict[str, NDArray[np.float64]]:
         """The columns of history.csv from row `first` on, each shape (row_count,), float64."""
@@ -171,8 +174,7 @@ class SceneRun:
         found["rigid_bodies"] = rigid_bodies(model, u, v)
         if model.body_joints:
             found["joints"] = joint_reports(self.solver, self.index, history)
-        names = [body.name for body in scene.bodies if not body.rigid]
-        found["flexible_bodies"] = flexible_bodies(model, u, v, names)
+        found["flexible_bodies"] = flexible_bodies(model, u, v, [body.name for body in scene.bodies if not body.rigid])
         return found
 
     def _facts(self, wall: Mapping[str, float], shares: Mapping[str, SpringShare | None]) -> dict[str, Any]:
@@ -237,7 +239,7 @@ class SceneRun:
     def _bodies(self) -> dict[str, dict[str, Any]]:
         """Mass of each body, and its greatest stress and plastic strain."""
         scene, meshes = self.ready.scene, self.ready.meshes
-        masses = body_report(scene.bodies, meshes, scene.masses)
+        masses = self.ready.masses or body_report(scene.bodies, meshes, scene.masses)
         peaks = peak_report(scene, meshes, self.solver, self.state, self.index, self.steps)
         return {name: {**masses[name], **peaks.get(name, {})} for name in masses}
 
@@ -260,8 +262,7 @@ class SceneRun:
         if self.ledger.framed:
             found["floating_frames"] = True
         if self.ready.model.fails:
-            meshes = self.ready.meshes
-            found["failure"] = failure_report(self.ready.scene, meshes, self.solver, self.state, self.index)
+            found["failure"] = failure_report(self.ready.scene, self.ready.meshes, self.solver, self.state, self.index)
         return found
 
     def _extremes(self) -> dict[str, float]:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from warp_mca.base.garbage import few_collections
 from warp_mca.geometry.mesh import Mesh
-from warp_mca.phases.by_helpers import prepared, told
+from warp_mca.phases.by_helpers import Telling, prepared
 from warp_mca.phases.carry_out import Course, begin
 from warp_mca.phases.forecast import announce
 from warp_mca.phases.prepare import Request
@@ -17,6 +18,7 @@ from warp_mca.scene import Scene
 from warp_mca.system.reading import read_once
 
 
+@few_collections()
 def simulate(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | None, request: Request) -> list[Result]:
     """Run scenes side by side.
 
@@ -58,6 +60,7 @@ def simulate(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | Non
         tell("impact", impact.rows / (impact.steps.intervals + 1))
 
     course, done = Course(impact, request), False
+    tell("impact", 0.0)
     try:
         course.run(lone.scene.phases, seen, tell=lambda share: tell("impact", share), opening=opening)
         done = True
@@ -68,13 +71,12 @@ def simulate(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | Non
             clock.lap("output")
     failed = tuple(recording.failed) if recording else ()
     tell("impact", 1.0)
+    homes = [item.looks.home for item in impact.scene_runs]
+    telling, ended = Telling([item.warnings for item in ready], homes, request.settings.threads), dict[int, Result]()
     with read_once():
         impact.look_at_the_end()
-        ended = [
-            item.outcome(clock.wall, stopped, before=rows_before(item, course.stretches))
-            for item, stopped in zip(impact.scene_runs, impact.stopped, strict=True)
-        ]
-    warnings = told([finished for _, finished in ended], [item.warnings for item in ready], request.settings.threads)
-    return [
-        replace(result, warnings=(*own, *said), failed=failed) for (result, _), own in zip(ended, warnings, strict=True)
-    ]
+        for k in telling.order:
+            before = rows_before(impact.scene_runs[k], course.stretches)
+            ended[k], finished = impact.scene_runs[k].outcome(clock.wall, impact.stopped[k], before=before)
+            telling.take(k, finished)
+    return [replace(ended[k], warnings=(*own, *said), failed=failed) for k, own in enumerate(telling.told())]

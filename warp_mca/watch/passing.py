@@ -36,7 +36,6 @@ class Watch:
     """What is looked at in one scene.
 
     Attributes:
-        cases: what can go into each other.
         nodes: of the skins, those of each in turn, in the model's numbering, int32; empty where there is no case.
     """
 
@@ -48,13 +47,37 @@ class Watch:
         dt: float,
         span: float,
         skins: Sequence[Skin] = (),
+        nodes: Index | None = None,
     ) -> None:
-        """Choose what to look at in an impact phase of `span` [s] with steps of `dt` [s]; `skins` as `skins_of`."""
-        self._dt, self._most = dt, max(1, int(span / FEWEST / dt))
+        """Choose what to look at in an impact phase of `span` [s] with steps of `dt` [s].
+
+        Args:
+            scene, meshes, model: what moves.
+            dt, span: as above.
+            skins: as `skins_of`; made where they are empty.
+            nodes: as a helper has them that looks in place of this; skins are made if it is lost.
+        """
+        self.take_steps(dt, span)
         self._driven = float(np.abs(model.table_value).max(initial=0.0))
         self._gravity = float(np.linalg.norm(scene.gravity))
         self._of = scene, meshes, model
-        self._take(skins or skins_of(scene, meshes, model), model.passes)
+        self._cases: list[Case] | None = None
+        if nodes is None:
+            self._take(skins or skins_of(scene, meshes, model), model.passes)
+        else:
+            self.nodes = nodes
+
+    def take_steps(self, dt: float, span: float) -> None:
+        """Look often enough in an impact phase of `span` [s] with steps of `dt` [s]."""
+        self._dt, self._most = dt, max(1, int(span / FEWEST / dt))
+
+    @property
+    def cases(self) -> list[Case]:
+        """What can go into each other."""
+        if self._cases is None:
+            self._take(skins_of(*self._of), self._of[2].passes)
+        assert self._cases is not None
+        return self._cases
 
     def renew(self, faces: Mapping[str, Index], passes: tuple[ContactPass, ...], passed: Array) -> Array:
         """Look at other surfaces from now on.
@@ -80,9 +103,9 @@ class Watch:
     def _take(self, skins: Sequence[Skin], passes: tuple[ContactPass, ...]) -> None:
         scene, meshes, model = self._of
         model, self._skins = replace(model, passes=passes), skins
-        self.cases = list(cases_of(scene, meshes, model, self._skins))
+        self._cases = list(cases_of(scene, meshes, model, self._skins))
         nodes = np.concatenate([np.zeros(0, np.int32), *(skin.nodes for skin in self._skins)])
-        self.nodes = nodes[: None if self.cases else 0]
+        self.nodes = nodes[: None if self._cases else 0]
 
     def look(self, x: Array, speed: float, pressed: Array, time: float, passed: Array) -> tuple[Array, int]:
         """What has been seen, with bodies as they are now, and how many steps may pass between two looks.
@@ -96,19 +119,20 @@ class Watch:
         """
         if not np.isfinite(x).all():
             return passed, self._most
+        cases = self.cases  # with the skins
         first = np.cumsum([len(skin.nodes) for skin in self._skins])[:-1]
         for skin, own in zip(self._skins, np.split(x, first), strict=True):
             skin.move(own)
         look = Look(self._skins)
         passed = passed.copy() if len(passed) else self._start(look)
-        for case, kept in zip(self.cases, passed, strict=True):
+        for case, kept in zip(cases, passed, strict=True):
             allowed = case.allowed(pressed)
             depth, at = case.found(look, allowed)
             if depth > allowed + MEANT * kept[START]:
                 kept[TIME] = kept[TIME] if kept[DEPTH] else time
                 if depth > kept[DEPTH]:
                     kept[DEPTH], kept[PLACE] = depth, at
-        return passed, self._steps(min(case.room(look) for case in self.cases), speed)
+        return passed, self._steps(min(case.room(look) for case in cases), speed)
 
     def _start(self, look: Look) -> Array:
         """Rows with the overlap at the start."""

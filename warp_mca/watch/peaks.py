@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warp_mca.kernels.records.extremes import PLASTIC_STRAIN, VON_MISES
 from warp_mca.system.reading import on_host
@@ -38,7 +39,7 @@ def peak_report(
         steps: of the run.
     """
     return {
-        body.name: {key: _greatest(body.name, meshes, solver, state, index, row, steps) for key, row in ROWS.items()}
+        body.name: _greatest(body.name, meshes[body.name], solver, state, index, steps)
         for body in scene.bodies
         if not body.rigid
     }
@@ -55,27 +56,28 @@ def greatest_peaks(reports: Sequence[Mapping[str, Mapping[str, Any]]], offsets: 
     return found
 
 
-def _greatest(
-    name: str, meshes: Mapping[str, Mesh], solver: Solver, state: State, index: int, row: int, steps: Steps
-) -> Peak:
+def _greatest(name: str, mesh: Mesh, solver: Solver, state: State, index: int, steps: Steps) -> dict[str, Peak]:
     key = name if solver.model.batch is None else f"{index}/{name}"
-    value, record, nodes = max(_of_blocks(solver, state, index, key, meshes[name], row), key=lambda item: item[0])
-    if value == 0.0:
-        return {"value": 0.0, "at": None, "time": None}
-    place = meshes[name].points[nodes - solver.model.node_start[key]].mean(axis=0)
-    return {"value": value, "at": place.tolist(), "time": steps.time(record)}
+    parts, found = list(_of_blocks(solver, state, index, key, mesh)), {}
+    for figure, row in ROWS.items():
+        greatest: tuple[float, int, Index] = 0.0, 0, np.zeros(0, np.int32)
+        for peak, own, conn in parts:
+            k = own[np.argmax(peak[row, own])] if row < len(peak) else -1
+            if k >= 0 and peak[row, k] > greatest[0]:
+                greatest = float(peak[row, k]), int(peak[row + 1, k]), conn[:, k]
+        value, record, nodes = greatest
+        at = mesh.points[nodes - solver.model.node_start[key]].mean(axis=0).tolist() if value else None
+        found[figure] = {"value": value, "at": at, "time": steps.time(record) if value else None}
+    return found
 
 
 def _of_blocks(
-    solver: Solver, state: State, index: int, key: str, mesh: Mesh, row: int
-) -> Iterator[tuple[float, int, Index]]:
-    """Greatest value of a body in each block, the number of its record, and the nodes of its element; 0 first."""
-    yield 0.0, 0, np.zeros(0, np.int32)
+    solver: Solver, state: State, index: int, key: str, mesh: Mesh
+) -> Iterator[tuple[Array, Index, NDArray[np.int32]]]:
+    """Peaks and nodes of the elements of each block, and which of them are a body's, where there are any."""
     model, start = solver.model, solver.model.element_start[key]
     for stage, (first, end) in zip(solver.elements, solver.layout.elements[index].tolist(), strict=True):
         element = model.element_of[first:end]
         own = np.flatnonzero((element >= start) & (element < start + mesh.cell_count)) + first - stage.block.first
-        peak: Array = on_host(state.elements[stage.index].peak)
-        if len(own) and row < len(peak):
-            k = own[np.argmax(peak[row, own])]
-            yield float(peak[row, k]), int(peak[row + 1, k]), stage.block.conn[:, k]
+        if len(own):
+            yield on_host(state.elements[stage.index].peak), own, stage.block.conn

@@ -254,13 +254,18 @@ def _uneven(lower: Array, upper: Array, start: NDArray[np.int64]) -> NDArray[np.
 
 def _slots(key: NDArray[np.int64], number: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Of sorted keys with the numbers of their corners, sorted too: key of each slot, and slot of each corner."""
-    new = np.append(True, key[1:] != key[:-1])
-    if not (again := np.append(False, ~new[1:] & (number[1:] == number[:-1]))).any():
-        return key[new], np.cumsum(new) - 1
-    begin = np.flatnonzero(~again)
-    rank = np.arange(len(key)) - np.repeat(begin, np.diff(np.append(begin, len(key))))
-    order = np.lexsort([rank, key])
-    new = np.append(True, (key[order][1:] != key[order][:-1]) | (rank[order][1:] != rank[order][:-1]))
-    slot = np.empty_like(order)
-    slot[order] = np.cumsum(new) - 1
-    return key[order][new], slot
+    opened = np.append(True, key[1:] != key[:-1])
+    again = np.append(False, ~opened[1:] & (number[1:] == number[:-1]))
+    if not again.any():
+        return key[opened], np.cumsum(opened) - 1
+    group = np.cumsum(opened) - 1
+    several = np.zeros(group[-1] + 1, dtype=bool)
+    several[group[again]] = True
+    where = np.flatnonzero(several[group])  # few: of nodes at which corners of one number meet
+    begin = np.flatnonzero(~again[where])
+    rank = np.arange(len(where)) - np.repeat(begin, np.diff(np.append(begin, len(where))))
+    order = np.lexsort([rank, key[where]])
+    opened[where[1:]] |= rank[order][1:] != rank[order][:-1]
+    slot = np.cumsum(opened) - 1
+    slot[where[order]] = slot[where]
+    return key[opened], slot

@@ -37,33 +37,39 @@ def with_floating_frames(model: Model, scenes: Sequence[Scene], span: float, pre
     start = np.array(list(model.node_start.values()), dtype=np.int64)
     count = np.diff(start, append=model.node_count)
     nodes = [slice(first, first + n) for first, n in zip(start, count, strict=True)]
-    marker = np.array([part.start + _markers(model.X[part]) for part in nodes], dtype=np.int32)
     if not any(
-        _growth(body, model.X[ends], span, model.stable.dt) > ALLOWED and _is_free(model, part)
-        for body, ends, part in zip(bodies, marker, nodes, strict=True)
+        _growth(body, model.X[part], span, model.stable.dt) > ALLOWED and _is_free(model, part)
+        for body, part in zip(bodies, nodes, strict=True)
         if not body.rigid
     ):
         return model
+    marker = np.array([part.start + _markers(model.X[part]) for part in nodes], dtype=np.int32)
     frame = np.repeat(np.arange(len(start), dtype=np.int32), count)
     return replace(model, floating=FloatingFrames(frame=frame, marker=marker))
 
 
 def _markers(X: Array) -> Index:
     """Four nodes of a body that lie far apart: a third off the line of the first two, a fourth off the plane."""
-    first = int(np.argmax(((X - X[0]) ** 2).sum(axis=1)))
+    first, second = _ends(X)
     away = X - X[first]
-    second = int(np.argmax((away**2).sum(axis=1)))
     across = np.cross(away, away[second])
     third = int(np.argmax((across**2).sum(axis=1)))
     fourth = int(np.argmax(np.abs(away @ across[third])))
     return np.array([first, second, third, fourth], dtype=np.int32)
 
 
-def _growth(body: Body, ends: Array, span: float, dt: float) -> float:
-    """Growth of a body's kinetic energy by rounding [-]; its length [m] is that between the first two `ends`."""
+def _ends(X: Array) -> tuple[int, int]:
+    """Two nodes of a body that lie far apart."""
+    first = int(np.argmax(((X - X[0]) ** 2).sum(axis=1)))
+    return first, int(np.argmax(((X - X[first]) ** 2).sum(axis=1)))
+
+
+def _growth(body: Body, X: Array, span: float, dt: float) -> float:
+    """Growth of the kinetic energy of a body with nodes in X [m] by rounding [-]."""
     materials = body.material.values() if isinstance(body.material, Mapping) else (body.material,)
     speed = max(material.wave_speeds["bar"] for material in materials)
-    passes = speed * span / float(np.linalg.norm(ends[1] - ends[0]))
+    first, second = _ends(X)
+    passes = speed * span / float(np.linalg.norm(X[second] - X[first]))
     return GAIN * EPSILON**2 * (span / dt) * passes * passes
 
 
