@@ -29,10 +29,6 @@ def refuse_at_hand_off(machine: Machine) -> None:
         RequestError: the machine has something of it.
     """
     model, names, mj = machine.model, machine.names, machine.mj
-    for flag in ("SPRING", "DAMPER", "CLAMPCTRL", *(("EQUALITY", "CONSTRAINT") if model.neq else ())):
-        if int(model.opt.disableflags) & int(getattr(mj.mjtDisableBit, f"mjDSBL_{flag}")):
-            remedy = "an impact has springs, dampers, equalities and clamps of controls; take this flag out of the file"
-            raise bad_value("Robot: flag", f"{flag.lower()} disabled", remedy)
     for k in range(model.njnt):
         dofs = slice(int(model.jnt_dofadr[k]), int(model.jnt_dofadr[k]) + machine.rates_of(k))
         if (least := float(model.dof_damping[dofs].min())) < 0.0:
@@ -170,7 +166,7 @@ def _motor(machine: Machine, joint: int, zero: float, gearing: Gearing) -> Motor
     tendon, own = int(machine.mj.mjtTrn.mjTRN_TENDON), model.actuator_trnid[:, 0] == joint
     drives = [drive_of(machine, int(k), 1.0, zero) for k in np.flatnonzero(own & (model.actuator_trntype != tendon))]
     drives += gearing.drives(joint)
-    if machine.passive or not drives:
+    if "ACTUATION" in machine.off or not drives:
         return Motors(None, NO_DRIVE, ())
     if model.jnt_actfrclimited[joint]:  # effort of a URDF
         drives = [held(drive) for drive in drives]

@@ -132,7 +132,7 @@ class Gearing:
         """Take a tendon: its actuators, spring and damper."""
         machine, model = self._machine, self._machine.model
         parts = [(joint, c) for joint, c in _parts(machine, tendon) if self._root(joint)[1]]
-        actuators = [] if machine.passive else _actuators(machine, tendon)
+        actuators = [] if "ACTUATION" in machine.off else _actuators(machine, tendon)
         stiffness, damping = float(model.tendon_stiffness[tendon]), float(model.tendon_damping[tendon])
         if not parts or not (actuators or stiffness or damping):
             return
