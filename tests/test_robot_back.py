@@ -123,12 +123,16 @@ def test_an_impact_without_a_touch_is_a_piece_of_the_swing(tmp_path, name):
     assert abs(back.vibration) < 1e-9
 
 
-def test_balls_with_dry_friction_go_on_to_first_order(tmp_path):
+def test_balls_with_dry_friction_go_on_to_first_order_and_say_so(tmp_path, caplog):
     """Three hinges stand for each: off by 2e-4 of the way of 5 mrad; without its springs it would be by 1e-2."""
     start = {"qvel": (1.0, 2.0, 3.0, -2.0, 1.0, 4.0), "qpos": {"s": (0.8, 0.6, 0.0, 0.0)}}
     machine = robot(SOCKETS, tmp_path, **start)
     swing = machine.swing(t_end=0.02)
     scene = machine.strike(impact=replace(IMPACT, duration=1e-3, output_interval=1e-5), swing=swing)
+    turn = 1e-3 * np.linalg.norm(swing.qvel[:3])
+    assert [f"wrong by up to the {turn:.2g} rad" in line for line in caplog.messages if "three hinges" in line] == [
+        True
+    ]
     back = machine.after(swing, scene, mca.run(scene, precision="float64"))
     later = machine.swing(t_end=back.robot.clock)
     assert np.array(back.robot.qpos) == pytest.approx(later.qpos, abs=1e-6)

@@ -110,3 +110,12 @@ def test_swings_that_would_not_end_are_refused(tmp_path):
     with pytest.raises(mca.RequestError, match=r"greatest rate of the machine at t = 4.99e-08 s .* steps of 5e-11 s"):
         robot(text, tmp_path, qvel=rates).swing()
     assert robot(text, tmp_path, qvel=rates).swing(t_end=1e-9).t_end == 1e-9
+
+
+def test_a_far_geom_does_not_widen_what_may_touch(tmp_path):
+    """A ball that turns at 5 rad/s and falls at 2.5 m/s comes 4 mm far in the impact, and not to a shelf 0.2 m away."""
+    shelf = '<geom name="shelf" type="box" pos="0.35 0 0.05" size="0.1 0.1 0.01"/><geom size="0.1" pos="900 0 0"/>'
+    text = DROP.format(flag="", floor=1, pair="").replace('<body name="post"', f'{shelf}<body name="post"')
+    machine = robot(text, tmp_path, qvel=(0.0, 0.0, 0.0, 0.0, 5.0, 0.0))
+    scene = machine.strike(impact=mca.ImpactPhase(duration=8e-4))
+    assert [contact.sides for contact in scene.contacts] == [("ball", "plane")]

@@ -10,6 +10,7 @@ import numpy as np
 
 from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
+from warp_mca.base.log import warn
 from warp_mca.robots.machine import FRICTION_RATE
 from warp_mca.robots.sockets import axes_of, turned
 from warp_mca.scene import Amplitude, Freedom, PositionServo
@@ -81,7 +82,7 @@ def freedoms_of(machine: Machine, joint: int, qpos: Array, gearing: Gearing) -> 
     """The freedom of a joint of the file, at coordinates `qpos`, with what tendons and equalities do to it.
 
     A ball with dry friction or a range is three hinges, the first along the axis about which it is turned; that is
-    right to first order in what it turns in the impact.
+    right to first order in what it turns in the impact, of which a warning tells.
 
     Positions count from the pose in which axes are given, so that `ref` of the file is taken off.
 
@@ -92,6 +93,10 @@ def freedoms_of(machine: Machine, joint: int, qpos: Array, gearing: Gearing) -> 
     kind, at = int(model.jnt_type[joint]), tuple(float(v) for v in model.jnt_pos[joint])
     dof, place = int(model.jnt_dofadr[joint]), int(model.jnt_qposadr[joint])
     if kind == int(mj.mjtJoint.mjJNT_BALL):
+        if three_hinges(machine, joint):
+            turn = float(np.linalg.norm(machine.data.qvel[dof : dof + 3])) * gearing.duration
+            text = f"ball {machine.names.joint(joint)} has dry friction or a range and is three hinges in the impact"
+            warn([f"{text}; their torques point wrong by up to the {turn:.2g} rad that it turns at its present rate"])
         return _ball(machine, joint, qpos[place : place + 4])
     zero = float(model.qpos0[place])
     motor, beside, more = _motor(machine, joint, zero, gearing)
