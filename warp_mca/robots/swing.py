@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 SAMPLE_COUNT = 257  # of the trajectory that is kept
 BEFORE = 1e-7  # gap at which the normal of a touch is taken [m]
 PARTING = 1e-3  # and after an impact [m]: faces of round geoms lie that deep in them, at a radius of 60 mm
-MOST_STEPS = 1_000_000  # of a swing: they take a quarter of an hour
+MOST_STEPS = 10_000_000  # of a swing: they take hours
 LOOK = 1000  # steps from one forecast of their number to the next
 ROUND_OFF = 1e-12  # gaps up to this at the start are closed [m]
 
