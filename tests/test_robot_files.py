@@ -118,4 +118,5 @@ def test_a_far_geom_does_not_widen_what_may_touch(tmp_path):
     text = DROP.format(flag="", floor=1, pair="").replace('<body name="post"', f'{shelf}<body name="post"')
     machine = robot(text, tmp_path, qvel=(0.0, 0.0, 0.0, 0.0, 5.0, 0.0))
     scene = machine.strike(impact=mca.ImpactPhase(duration=8e-4))
-    assert [contact.sides for contact in scene.contacts] == [("ball", "plane")]
+    sides = [contact.sides for contact in scene.contacts if isinstance(contact, mca.Contact)]
+    assert sides == [("ball", "plane")]
