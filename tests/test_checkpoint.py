@@ -45,7 +45,7 @@ class StoppedError(Exception):
 def stops(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[int]]:
     """Runs into a folder until the state has been stored so often; gives the steps at which it was."""
 
-    def stop(out: Path, count: int, **settings: Any) -> list[int]:
+    def stop(out: Path, count: int, scene: mca.Scene = LANDING, **settings: Any) -> list[int]:
         steps, store = [], Checkpoint.store
 
         def store_and_stop(self: Checkpoint, impact: Any, place: Any, more: Any = None) -> None:
@@ -57,7 +57,7 @@ def stops(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[int]]:
         with monkeypatch.context() as patch:
             patch.setattr(Checkpoint, "store", store_and_stop)
             with pytest.raises(StoppedError):
-                mca.run(LANDING, out=out, threads=1, **settings)
+                mca.run(scene, out=out, threads=1, **settings)
         return steps
 
     return stop
@@ -72,6 +72,38 @@ def test_a_run_goes_on_from_its_last_state(tmp_path: Path, stops: Callable[..., 
     assert all(np.array_equal(result[name], whole[name], equal_nan=True) for name in whole.history)
     assert result.summary["energy"] == whole.summary["energy"]
     assert not (tmp_path / "out" / FILE).exists()
+
+
+def driven(function: Callable[..., Any], period: float = 2e-4) -> mca.Scene:
+    """A rotor that a function drives."""
+    motor = mca.Controller(function=function, period=period)
+    rotor = mca.Body(name="rotor", rigid=True, mass=1.0, inertia=(0.1, 0.1, 0.1))
+    pivot = mca.Articulation(name="J", body="rotor", freedoms=(mca.Freedom(motor=motor),))
+    impact = mca.ImpactPhase(duration=2e-3, output_interval=1e-4)
+    return mca.Scene(name="driven", bodies=(rotor,), joints=(pivot,), impact=impact)
+
+
+def integral() -> Callable[..., float]:
+    """A controller that keeps the sum of what it saw."""
+    total = [0.0]
+
+    def torque(t: float, q: Any, rate: Any) -> float:
+        total[0] += 1.0 + 0.1 * float(q[0])
+        return total[0]
+
+    return torque
+
+
+def test_a_controller_has_its_own_state_again(tmp_path: Path, stops: Callable[..., list[int]]):
+    whole = mca.run(driven(integral()), threads=1)
+    assert whole["joint_J_drive1_Nm"][-1] == pytest.approx(10.0, rel=1e-3)  # of ten calls
+    stops(tmp_path, 2, driven(integral()), checkpoint="5e-4s")
+    with pytest.raises(mca.RequestError, match="'<lambda>': at 0 s it gives other numbers than before"):
+        mca.run(driven(lambda t, q, rate: 2.0), out=tmp_path, threads=1, checkpoint="5e-4s")
+    with pytest.raises(mca.RequestError, match=r"of another request \(controllers\)"):
+        mca.run(driven(integral(), 1e-4), out=tmp_path, threads=1, checkpoint="5e-4s")
+    result = mca.run(driven(integral()), out=tmp_path, threads=1, checkpoint="5e-4s")
+    assert all(np.array_equal(result[name], whole[name], equal_nan=True) for name in whole.history)
 
 
 @pytest.mark.parametrize(("every", "steps"), [("7e-6s", [7, 14]), ("1e-9w", [1, 2]), ("1000w", [])])

@@ -151,6 +151,27 @@ def test_stiffness_of_its_own_is_that_of_the_node_that_touches():
     assert np.count_nonzero(result.F_n) == pytest.approx(200, abs=2)
 
 
+def test_stiffness_of_its_own_is_that_of_edges_that_cross():
+    """The lower edge of a rigid cube falls across the upper one of another: F = v sqrt(m k), for pi sqrt(m / k)."""
+    cube, turn = mca.Box(size=(0.02,) * 3, divisions=(1, 1, 1), origin=(-0.01,) * 3), 0.25 * math.pi
+    high = {"position": (0.0, 0.0, 0.02 * math.sqrt(2.0) + 1e-7), "velocity": (0.0, 0.0, -1.0)}
+    bodies = (
+        mca.Body(name="top", geometry=cube, material=STEEL, rigid=True, rotation=(turn, 0.0, 0.0), **high),
+        mca.Body(name="base", geometry=cube, material=STEEL, rigid=True, rotation=(0.0, turn, 0.0)),
+    )
+    sides = {"slave": mca.Surface(body="top", nodes="boundary"), "master": mca.Surface(body="base", nodes="boundary")}
+    mass, held = 7850.0 * 0.02**3, mca.Fixed(body="base", nodes="boundary")
+    duration = math.pi * math.sqrt(mass / 1e6)
+    impact = mca.ImpactPhase(duration=1.1 * duration, output_interval=duration / 200.0)
+    scene = mca.Scene(
+        name="edges", bodies=bodies, contacts=(mca.Contact(**sides, stiffness=1e6),), fixed=(held,), impact=impact
+    )
+    result = mca.run(scene)
+    assert result.summary["extremes"]["F_n_max"] == pytest.approx(math.sqrt(mass * 1e6), rel=1e-3)
+    assert np.count_nonzero(result.F_n) == pytest.approx(200, abs=2)
+    assert abs(result.summary["energy_error"]) < 1e-5
+
+
 @pytest.mark.parametrize("more", [{"penalty": 3.0}, {"bond": mca.Bond(normal=1e6)}])
 def test_stiffness_of_its_own_stands_alone(more):
     sides = {"slave": mca.Surface(body="a", nodes="zmin"), "master": mca.Surface(body="b", nodes="zmax")}

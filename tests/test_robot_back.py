@@ -43,19 +43,21 @@ def momenta(machine, swing):
     return P, L
 
 
-def test_free_chain_keeps_its_momenta_through_swings_and_impacts(tmp_path):
+def test_free_chain_keeps_its_momenta_through_five_swings_and_impacts(tmp_path):
     """The rotor of 1e-3 kg m^2 takes no part in the momenta of the whole: its reaction is that of the hinge."""
     machine = robot(CHAIN.replace(' armature="0.001"', ""), tmp_path, **START)
     swing = machine.swing()
     P, L = momenta(machine, swing)
-    scene = machine.strike(impact=IMPACT, swing=swing, stiffness=1e8)
-    back = machine.after(swing, scene, mca.run(scene, precision="float64"))
-    again = back.robot.swing()
-    assert again.touch is not None and again.t_end > 0.05
-    P1, L1 = momenta(back.robot, again)
-    assert np.abs(P1 - P).max() < 1e-10 * np.linalg.norm(P)
-    assert np.abs(L1 - L).max() < 1e-10 * max(np.linalg.norm(L), 0.1)
-    assert abs(back.vibration) < 1e-6 * swing.kinetic_energy
+    for _ in range(5):
+        scene = machine.strike(impact=IMPACT, swing=swing, stiffness=1e8)
+        back = machine.after(swing, scene, mca.run(scene, precision="float64", figures="none"))
+        assert abs(back.vibration) < 1e-6 * swing.kinetic_energy
+        machine = back.robot
+        swing = machine.swing()
+        assert swing.touch is not None and swing.t_end > 0.05
+        P1, L1 = momenta(machine, swing)
+        assert np.abs(P1 - P).max() < 1e-10 * np.linalg.norm(P)
+        assert np.abs(L1 - L).max() < 1e-10 * np.linalg.norm(L)
 
 
 # Springs, dampers, dry friction, limits, servos, motors, rotors, balls, loops, fixed links and zeros of joints.
@@ -121,12 +123,16 @@ def test_an_impact_without_a_touch_is_a_piece_of_the_swing(tmp_path, name):
     assert abs(back.vibration) < 1e-9
 
 
-def test_balls_with_dry_friction_go_on_to_first_order(tmp_path):
+def test_balls_with_dry_friction_go_on_to_first_order_and_say_so(tmp_path, caplog):
     """Three hinges stand for each: off by 2e-4 of the way of 5 mrad; without its springs it would be by 1e-2."""
     start = {"qvel": (1.0, 2.0, 3.0, -2.0, 1.0, 4.0), "qpos": {"s": (0.8, 0.6, 0.0, 0.0)}}
     machine = robot(SOCKETS, tmp_path, **start)
     swing = machine.swing(t_end=0.02)
     scene = machine.strike(impact=replace(IMPACT, duration=1e-3, output_interval=1e-5), swing=swing)
+    turn = 1e-3 * np.linalg.norm(swing.qvel[:3])
+    assert [f"wrong by up to the {turn:.2g} rad" in line for line in caplog.messages if "three hinges" in line] == [
+        True
+    ]
     back = machine.after(swing, scene, mca.run(scene, precision="float64"))
     later = machine.swing(t_end=back.robot.clock)
     assert np.array(back.robot.qpos) == pytest.approx(later.qpos, abs=1e-6)

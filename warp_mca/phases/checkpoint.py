@@ -59,6 +59,7 @@ class Checkpoint:
             "impact": repr(ready.scene.impact),
             "t_end": repr(ready.scene.t_end),
             "phases": repr(ready.scene.phases),
+            "controllers": repr(impact.controls.plan),
             "span": repr(span),
             "dt": repr(solver.dt),
             "precision": settings.precision,

@@ -17,6 +17,7 @@ from warp_mca.base.joining import offsets
 from warp_mca.model.batch_model import join_models, with_alike_passes
 from warp_mca.model.paths import join_probes
 from warp_mca.model.sensors import join_sensors
+from warp_mca.phases.controls import Controls
 from warp_mca.phases.division import divide_alike
 from warp_mca.phases.exposed import Exposed
 from warp_mca.phases.impact_loop import Loop
@@ -58,6 +59,7 @@ class Impact:
         scene_runs: records and result of each scene.
         stopped: which guard stopped each scene, in one sentence, or None.
         recording: recorders of a lone scene, or None.
+        controls: what asks controllers, of which a batch has none.
         exposed: what follows the surface of a lone scene's elements as they fail, or None.
     """
 
@@ -108,6 +110,7 @@ class Impact:
         if not shape:
             settle_initial_overlap(self.ready, self.solver, self.state)
         self.solver.start(self.state)
+        self.controls = Controls(self.ready[0].scene, self.state)
         self.exposed = Exposed(self.ready[0], self.solver, self.state) if model.fails and len(ready) == 1 else None
         self.stopped: list[str | None] = [None] * len(self.ready)
         self.recording: Recording | None = None
@@ -150,11 +153,12 @@ class Impact:
         """Go on from a state that `save` stored.
 
         Raises:
-            RequestError: as in `State.load`.
+            RequestError: as in `State.load`; a controller gives other numbers than before.
         """
         if self.exposed and Path(path).is_file() and (skins := self.exposed.restore(path)) is not None:
             self._watches[0].renew(skins, self.exposed.passes, np.zeros((0, 6)))
         self.state.load(path, self.solver.model, self.solver.dt)
+        self.controls.restore(path)
         self.stopped = [None] * len(self.ready)
         self._begin_scenes()
 
@@ -164,7 +168,7 @@ class Impact:
         Raises:
             OSError: the file cannot be written.
         """
-        self.state.save(path, self.solver.model, self.solver.dt, more)
+        self.state.save(path, self.solver.model, self.solver.dt, {**(more or {}), **self.controls.arrays()})
 
     def divide_anew(self, steps: Steps) -> list[SceneRecords]:
         """Go on with other intervals of the same time step: rows and peaks of stress begin anew, energies and extremes

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import warp as wp
 
 from warp_mca.base.errors import GuardError
-from warp_mca.phases.controls import Controls
 from warp_mca.step.steps import Part
 from warp_mca.step.transfer import Transfer
 from warp_mca.system.stage import Search
@@ -29,7 +28,6 @@ class Loop:
             self.solver.work.row.fill_(ROWS - 1)
         self.transfer = Transfer(self.solver.rings(self.state), self.solver.device)
         self.looks = self._looks()
-        self.controls = Controls(impact.ready[0].scene, self.state)
         self.written = 0
         if ended:  # each part of the ring is waited for
             self.solver.replay.note_ahead(self.state)
@@ -67,7 +65,7 @@ class Loop:
         first = interval * self.steps.per_interval
         if self.state.steps == first:
             self.looks.row(interval, self.steps.intervals)
-            self.controls.ask(interval, interval * self.steps.interval)
+            self.impact.controls.ask(interval, interval * self.steps.interval)
         for number, part in enumerate(self.steps.parts(interval)):
             end = first + part.count
             if self.state.steps < min(end, last):

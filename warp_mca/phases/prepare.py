@@ -105,6 +105,7 @@ class Request:
         tell: told of stages.
         recorders: of a lone scene.
         store: where a lone scene stores its state, and from which it goes on; None for never.
+        number: of the impact in a run of several, see `Course`; None in a run of one.
         clock: wall time by stage.
         begun: told of the scene, its model and its meshes by body, each time a model is assembled.
     """
@@ -114,6 +115,7 @@ class Request:
     tell: Progress = lambda stage, done: None
     recorders: Sequence[Recorder] = ()
     store: Checkpoint | None = None
+    number: int | None = None
     clock: Clock = field(default_factory=Clock)
     begun: Callable[[Scene, Model, Mapping[str, Mesh]], None] = lambda scene, model, meshes: None
 

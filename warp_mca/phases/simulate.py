@@ -59,7 +59,7 @@ def simulate(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | Non
             impact.recording.history(lambda: impact.scene_runs[0].history(first))
         tell("impact", impact.rows / (impact.steps.intervals + 1))
 
-    course, done = Course(impact, request), False
+    course, done = Course(impact, request, number=request.number), False
     tell("impact", 0.0)
     try:
         course.run(lone.scene.phases, seen, tell=lambda share: tell("impact", share), opening=opening)

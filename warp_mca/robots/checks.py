@@ -27,6 +27,9 @@ def check(robot: Robot) -> None:
     validate.kinds("Robot", Mapping, "give a Body for each link by its name", flexible=robot.flexible)
     validate.kinds("Robot", Mapping, "give a PositionServo for each joint by its name", servos=robot.servos)
     validate.kinds("Robot", Mapping, "give the node set that holds each flexible link", mounts=robot.mounts)
+    for name in robot.mounts:
+        if name not in robot.flexible:
+            raise bad_value("Robot.mounts", name, "this link is rigid; name it in flexible, or leave it out")
     for name, servo in robot.servos.items():
         validate.kind_of(f"Robot.servos[{name!r}]", servo, PositionServo, "give a PositionServo")
         if not validate.is_number(servo.target):

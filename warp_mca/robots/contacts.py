@@ -14,6 +14,7 @@ from warp_mca.robots.drawing import drawn_geoms
 from warp_mca.robots.filling import held_mass
 from warp_mca.robots.geoms import filled, geom_surface, is_long, is_round, joined, touching_at
 from warp_mca.robots.machine import Machine, Motion
+from warp_mca.robots.nearby import radius_of
 from warp_mca.scene import Body, Contact, RigidPlane, Surface
 from warp_mca.scene.metals import J2Bilinear
 
@@ -61,7 +62,7 @@ class Contacts:
         """
         t, q = self._swing.t_end, self._swing.qpos
         touch = self._swing.touch
-        reach = AHEAD * self._speed() * self._duration
+        reach = AHEAD * self._speed(pairs) * self._duration
         for pair in pairs:
             nearest = pair.nearest(t, q)
             touched = touch is not None and (pair.first.name, pair.second.name) == (touch.first, touch.second)
@@ -88,13 +89,16 @@ class Contacts:
                 face = across @ poses[k].rotation if both and k == flat and across.any() else None
                 self._touched.setdefault(geom, []).append((own[k], face))
 
-    def _speed(self) -> float:
-        """A bound of the speed of all links and bodies beside [m/s]."""
+    def _speed(self, pairs: Sequence[Pair]) -> float:
+        """A bound of the speed of all links, their mass centres and surfaces, and of bodies beside [m/s]."""
         machine, most = self._machine, 0.0
-        extent = float(machine.model.stat.extent)
+        reach = np.linalg.norm(machine.model.body_ipos, axis=1)
+        for side in (side for pair in pairs for side in (pair.first, pair.second) if side.link):
+            reach[side.link] = max(reach[side.link], radius_of(machine, side))
         for link in range(1, machine.model.nbody):
             motion = machine.motion(link)
-            most = max(most, float(np.linalg.norm(motion.velocity)) + extent * float(np.linalg.norm(motion.spin)))
+            turning = float(reach[link]) * float(np.linalg.norm(motion.spin))
+            most = max(most, float(np.linalg.norm(motion.velocity)) + turning)
         beside = [np.linalg.norm(b.velocity) for b in self._robot.against if isinstance(b, Body)]
         return most + float(max(beside, default=0.0))
 

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from warp_mca.base.errors import GuardError, RequestError
-from warp_mca.phases.arguments import one_at_a_time
+from warp_mca.base import validate
+from warp_mca.base.errors import GuardError, RequestError, bad_value
+from warp_mca.phases.arguments import check_recorders, one_at_a_time
+from warp_mca.phases.checkpoint import Checkpoint
+from warp_mca.phases.every import DEFAULT, Every, every_of
 from warp_mca.phases.prepare import Request
-from warp_mca.phases.settings import Settings
+from warp_mca.phases.settings import Settings, settings_of
 from warp_mca.phases.simulate import simulate
+from warp_mca.recorders.checks import check_files
+from warp_mca.results.storage import hold
 from warp_mca.robots.film import RobotFilm
 from warp_mca.robots.machine import Machine
 from warp_mca.robots.swing import RobotSwing, swing
+from warp_mca.scene import ImpactPhase
 
 if TYPE_CHECKING:
     from warp_mca.recorders.recorder import Recorder
@@ -52,17 +59,59 @@ class RobotRun:
     failed: tuple[str, ...] = ()
 
 
+STRIKE = {"stiffness", "mu", "fixed", "faces", "name"}  # of `Robot.strike`, beside the impact
+
+
+def checked_run(
+    robot: Robot,
+    t_end: float,
+    strike: Mapping[str, Any],
+    settings: tuple[str, str, int | None],
+    recorders: Sequence[Recorder],
+    kept: tuple[str | os.PathLike[str] | None, str | Every | None, bool],
+) -> RobotRun:
+    """As `Robot.run`: `settings` are device, precision and threads there, `kept` are out, checkpoint and force.
+
+    Raises:
+        RequestError: as in `Robot.swing` and `Robot.strike`; an argument is none, or an output cannot be made.
+        GuardError: an impact lost its footing.
+    """
+    validate.times("Robot.run", t_end=t_end)
+    validate.kinds("Robot.run", ImpactPhase, "give an ImpactPhase", impact=strike["impact"])
+    if unknown := sorted(set(strike) - STRIKE - {"impact"}):
+        raise bad_value("Robot.run", unknown[0], "give stiffness, mu, fixed, faces and name of strike, or none")
+    check_recorders(recorders)
+    check_files(recorders)
+    (out, checkpoint, force), found = kept, settings_of(*settings)
+    every = every_of("mca", checkpoint if out is None else checkpoint or DEFAULT, out, recorders)
+    if out is None or every is None:
+        return run(robot, t_end, strike, found, recorders)
+    with hold(out, force=force) as folder:
+        store = Checkpoint(folder.path, every, force)
+        ended = run(robot, t_end, strike, found, recorders, store)
+        store.remove()
+        return ended
+
+
 @one_at_a_time
 def run(
-    robot: Robot, t_end: float, strike: Mapping[str, Any], settings: Settings, recorders: Sequence[Recorder]
+    robot: Robot,
+    t_end: float,
+    strike: Mapping[str, Any],
+    settings: Settings,
+    recorders: Sequence[Recorder],
+    store: Checkpoint | None = None,
 ) -> RobotRun:
     """Swing and strike in turn until t_end [s]; `strike` has the arguments of `Robot.strike`.
+
+    `store` has the state of the impact that was under way and of those that had ended, from which they go on. Swings
+    are computed again, so that controllers have their own state again, too.
 
     Raises:
         RequestError: as in `Robot.swing` and `Robot.strike`; an output cannot be made.
         GuardError: an impact lost its footing.
     """
-    course = _Course(robot, t_end, strike, settings, recorders)
+    course = _Course(robot, t_end, strike, settings, recorders, store)
     done = False
     try:
         course.run()
@@ -74,7 +123,10 @@ def run(
 
 
 class _Course:
-    def __init__(self, robot: Robot, t_end: float, strike: Mapping[str, Any], settings: Settings, recorders: Any):
+    def __init__(
+        self, robot: Robot, t_end: float, strike: Mapping[str, Any], settings: Settings, recorders: Any, store: Any
+    ) -> None:
+        self._store = store
         self._robot, self._t_end, self._strike, self._settings = robot, t_end, strike, settings
         self._recorders, self.film, self._t = recorders, None, 0.0
         self._lists: dict[str, list[Any]] = {key: [] for key in ("swings", "scenes", "impacts", "backs", "starts")}
@@ -103,10 +155,12 @@ class _Course:
         robot, film = self._robot, self.film
         scene = robot.strike(swing=found, **self._strike)
         shown = [film.impact(found, start)] if film else []
-        request = Request(span=scene.impact.duration, settings=self._settings, recorders=shown)
+        number = 1 + len(self._lists["impacts"])
+        kept: dict[str, Any] = {"store": self._store, "number": number} if self._store else {}
+        request = Request(span=scene.impact.duration, settings=self._settings, recorders=shown, **kept)
         (result,) = simulate([scene], None, request)
         if result.stopped is not None:
-            raise GuardError(f"impact {len(self._lists['impacts']) + 1}: {result.stopped}")
+            raise GuardError(f"impact {number}: {result.stopped}")
         self._keep(scenes=scene, impacts=result, starts=self._t)
         try:
             back = robot.after(found, scene, result)

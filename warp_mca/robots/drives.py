@@ -10,6 +10,7 @@ import numpy as np
 
 from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
+from warp_mca.base.log import warn
 from warp_mca.robots.machine import FRICTION_RATE
 from warp_mca.robots.sockets import axes_of, turned
 from warp_mca.scene import Amplitude, Freedom, PositionServo
@@ -29,10 +30,6 @@ def refuse_at_hand_off(machine: Machine) -> None:
         RequestError: the machine has something of it.
     """
     model, names, mj = machine.model, machine.names, machine.mj
-    for flag in ("SPRING", "DAMPER", "CLAMPCTRL", *(("EQUALITY", "CONSTRAINT") if model.neq else ())):
-        if int(model.opt.disableflags) & int(getattr(mj.mjtDisableBit, f"mjDSBL_{flag}")):
-            remedy = "an impact has springs, dampers, equalities and clamps of controls; take this flag out of the file"
-            raise bad_value("Robot: flag", f"{flag.lower()} disabled", remedy)
     for k in range(model.njnt):
         dofs = slice(int(model.jnt_dofadr[k]), int(model.jnt_dofadr[k]) + machine.rates_of(k))
         if (least := float(model.dof_damping[dofs].min())) < 0.0:
@@ -85,7 +82,7 @@ def freedoms_of(machine: Machine, joint: int, qpos: Array, gearing: Gearing) -> 
     """The freedom of a joint of the file, at coordinates `qpos`, with what tendons and equalities do to it.
 
     A ball with dry friction or a range is three hinges, the first along the axis about which it is turned; that is
-    right to first order in what it turns in the impact.
+    right to first order in what it turns in the impact, of which a warning tells.
 
     Positions count from the pose in which axes are given, so that `ref` of the file is taken off.
 
@@ -96,6 +93,10 @@ def freedoms_of(machine: Machine, joint: int, qpos: Array, gearing: Gearing) -> 
     kind, at = int(model.jnt_type[joint]), tuple(float(v) for v in model.jnt_pos[joint])
     dof, place = int(model.jnt_dofadr[joint]), int(model.jnt_qposadr[joint])
     if kind == int(mj.mjtJoint.mjJNT_BALL):
+        if three_hinges(machine, joint):
+            turn = float(np.linalg.norm(machine.data.qvel[dof : dof + 3])) * gearing.duration
+            text = f"ball {machine.names.joint(joint)} has dry friction or a range and is three hinges in the impact"
+            warn([f"{text}; their torques point wrong by up to the {turn:.2g} rad that it turns at its present rate"])
         return _ball(machine, joint, qpos[place : place + 4])
     zero = float(model.qpos0[place])
     motor, beside, more = _motor(machine, joint, zero, gearing)
@@ -170,7 +171,7 @@ def _motor(machine: Machine, joint: int, zero: float, gearing: Gearing) -> Motor
     tendon, own = int(machine.mj.mjtTrn.mjTRN_TENDON), model.actuator_trnid[:, 0] == joint
     drives = [drive_of(machine, int(k), 1.0, zero) for k in np.flatnonzero(own & (model.actuator_trntype != tendon))]
     drives += gearing.drives(joint)
-    if machine.passive or not drives:
+    if "ACTUATION" in machine.off or not drives:
         return Motors(None, NO_DRIVE, ())
     if model.jnt_actfrclimited[joint]:  # effort of a URDF
         drives = [held(drive) for drive in drives]

@@ -27,6 +27,7 @@ class Gearing:
 
     Attributes:
         bodies, joints: of relays.
+        duration: of the impact [s].
     """
 
     def __init__(self, machine: Machine, duration: float) -> None:
@@ -35,7 +36,7 @@ class Gearing:
         Raises:
             RequestError: a joint is geared twice, or springs of a tendon are not carried.
         """
-        self._machine, self._duration = machine, duration
+        self._machine, self.duration = machine, duration
         self._leader: dict[int, tuple[int, float]] = {}
         kind, model = int(machine.mj.mjtEq.mjEQ_JOINT), machine.model
         equalities = [k for k in range(model.neq) if model.eq_active0[k] and int(model.eq_type[k]) == kind]
@@ -104,7 +105,7 @@ class Gearing:
             raise bad_value("Robot: equality", name, remedy)
         self._leader[one] = (other, ratio)
         if turns:
-            change = abs(turns * rate) * self._duration
+            change = abs(turns * rate) * self.duration
             text = (
                 f"equality {name} has the ratio {ratio:.6g} in the impact, which {change:.2g} of the way would change"
             )
@@ -132,7 +133,7 @@ class Gearing:
         """Take a tendon: its actuators, spring and damper."""
         machine, model = self._machine, self._machine.model
         parts = [(joint, c) for joint, c in _parts(machine, tendon) if self._root(joint)[1]]
-        actuators = [] if machine.passive else _actuators(machine, tendon)
+        actuators = [] if "ACTUATION" in machine.off else _actuators(machine, tendon)
         stiffness, damping = float(model.tendon_stiffness[tendon]), float(model.tendon_damping[tendon])
         if not parts or not (actuators or stiffness or damping):
             return

@@ -14,6 +14,7 @@ from warp_mca.robots.masses import MassProperties, of_link, regular, rest_of
 from warp_mca.robots.reading import Names, compiled, mujoco, scenery, with_masses
 from warp_mca.robots.sockets import sockets_of
 from warp_mca.robots.start import start_of
+from warp_mca.robots.switches import switched_off
 from warp_mca.robots.warned import warnings_logged
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ class Machine:
         ctrl: controls that are held, shape (nu,), float64.
         limited, limited_q: index of the rate and of the coordinate of each joint with a limit, int.
         range: its limits [rad, m], shape (count, 2), float64.
-        passive: whether the file switches all drives off.
+        off: what the file's option switches off, as "ACTUATION" for all drives.
         limit_stiffness: of these limits [N m/rad, N/m], float64.
         limit_damping: of these limits [N m s/rad, N s/m], float64.
         sockets: balls with a range.
@@ -82,7 +83,7 @@ class Machine:
         self.data: Any = self.mj.MjData(self.model)
         self._beside: Any = self.mj.MjData(self.model)
         self.nq, self.nv = int(self.model.nq), int(self.model.nv)
-        self.passive = bool(int(self.model.opt.disableflags) & int(self.mj.mjtDisableBit.mjDSBL_ACTUATION))
+        self.off = switched_off(self.mj, spec.option.disableflags)
         scalar = self.model.jnt_type >= int(self.mj.mjtJoint.mjJNT_SLIDE)
         joints = np.flatnonzero(self.model.jnt_limited.astype(bool) & scalar)
         self.range, self.limited = self.model.jnt_range[joints], self.model.jnt_dofadr[joints]
@@ -122,7 +123,7 @@ class Machine:
     def meets_the_world(self) -> bool:
         """Whether the file has a geom beside the machine, not of its base, that something may touch."""
         beside = scenery(self.model)[self.model.geom_bodyid]
-        return bool((self.model.geom_contype | self.model.geom_conaffinity)[beside].any())
+        return "CONTACT" not in self.off and bool((self.model.geom_contype | self.model.geom_conaffinity)[beside].any())
 
     def set(self, data: Any, y: Array) -> None:
         """Give data coordinates and rates."""

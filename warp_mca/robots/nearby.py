@@ -28,7 +28,7 @@ class Nearby:
         self._machine, self.watches, self._data = machine, watches, machine.mj.MjData(machine.model)
         sides = [(pair.first, pair.second) for pair in pairs[: len(watches)]]
         self._links = np.array([[side.link for side in both] for both in sides], dtype=np.int64).reshape(-1, 2)
-        self._radius = np.array([_radius(machine, first) for first, _ in sides])
+        self._radius = np.array([radius_of(machine, first) for first, _ in sides])
         self._beside = np.array([_speed(second) for _, second in sides])
         self._least = np.array([watch.start for watch in watches])
         self._rates, self._t, self._fresh = self._bounds(y), 0.0, np.ones(len(watches), dtype=bool)
@@ -84,7 +84,7 @@ class Nearby:
         return origin, data.cvel[:, 3:] + np.cross(spin, arm), spin
 
 
-def _radius(machine: Machine, side: Side) -> float:
+def radius_of(machine: Machine, side: Side) -> float:
     """Of a ball around the origin of its link that a surface lies in [m]."""
     centre, model = 0.0, machine.model
     if side.geom is not None:

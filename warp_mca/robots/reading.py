@@ -11,6 +11,7 @@ import numpy as np
 
 from warp_mca.base.arrays import Array
 from warp_mca.base.errors import bad_value
+from warp_mca.robots.switches import take_out
 
 if TYPE_CHECKING:
     from warp_mca.robots.masses import MassProperties
@@ -47,8 +48,6 @@ def compiled(robot: Robot) -> tuple[Any, Any]:
     spec.compiler.fusestatic = False
     spec.option.jacobian = mj.mjtJacobian.mjJAC_DENSE
     spec.option.ccd_tolerance, spec.option.ccd_iterations = EXACT, 500
-    for flag in ("CONTACT", "LIMIT", "FRICTIONLOSS", "SENSOR", "ISLAND"):
-        spec.option.disableflags |= int(getattr(mj.mjtDisableBit, f"mjDSBL_{flag}"))
     spec.option.enableflags &= ~int(mj.mjtEnableBit.mjENBL_SLEEP)
     _add_servos(mj, spec, robot)
     model = _compiled(robot, spec)
@@ -81,7 +80,9 @@ def _compiled(robot: Robot, spec: Any) -> Any:
             model = spec.compile()
         except (ValueError, RuntimeError) as error:
             raise bad_value("Robot.file", robot.path, f"MuJoCo says: {_words(error)}; correct the file") from error
-    handle = mujoco("Robot.file", robot.path).get_mju_user_warning() or warnings.warn  # that of `warnings_logged`
+    mj = mujoco("Robot.file", robot.path)
+    take_out(mj, model)
+    handle = mj.get_mju_user_warning() or warnings.warn  # that of `warnings_logged`
     for item in said:
         handle(str(item.message))
     return model

@@ -22,6 +22,7 @@ from warp_mca.scene import Body, Fixed, ImpactPhase, PositionServo, RigidPlane, 
 from warp_mca.scene.materials import Material
 
 if TYPE_CHECKING:
+    from warp_mca.phases.every import Every
     from warp_mca.recorders.recorder import Recorder
     from warp_mca.results.result import Result
     from warp_mca.robots.course import RobotRun
@@ -214,6 +215,9 @@ class Robot:
         device: str = "cpu",
         precision: str = "mixed",
         threads: int | None = None,
+        out: str | os.PathLike[str] | None = None,
+        checkpoint: str | Every | None = None,
+        force: bool = False,
         **strike: Any,
     ) -> RobotRun:
         """Swing and strike in turn until a time: `swing`, `strike`, `mca.run` and `after`, again and again.
@@ -227,25 +231,18 @@ class Robot:
             impact: each one, at whose end all contacts must be open.
             recorders: what shows or writes the run, see `warp_mca.recorders`.
             device, precision, threads: of the impacts, as in `mca.run`.
+            out: folder for the state on the way, from which the same call goes on to the same bits; empty at the end.
+            checkpoint, force: of `out`, as in `mca.run`; by default each 30 s. Swings are computed again.
             strike: further arguments of `strike`: stiffness, mu, fixed, faces, name.
 
         Raises:
             RequestError: as in `swing` and `strike`; an output cannot be made.
             GuardError: an impact lost its footing.
         """
-        from warp_mca.phases.arguments import check_recorders
-        from warp_mca.phases.settings import settings_of
-        from warp_mca.recorders.checks import check_files
-        from warp_mca.robots.course import run
+        from warp_mca.robots.course import checked_run
 
-        validate.times("Robot.run", t_end=t_end)
-        validate.kinds("Robot.run", ImpactPhase, "give an ImpactPhase", impact=impact)
-        if unknown := sorted(set(strike) - {"stiffness", "mu", "fixed", "faces", "name"}):
-            raise bad_value("Robot.run", unknown[0], "give stiffness, mu, fixed, faces and name of strike, or none")
-        check_recorders(recorders)
-        check_files(recorders)
-        settings = settings_of(device, precision, threads)
-        return run(self, t_end, {"impact": impact, **strike}, settings, recorders)
+        kept = (out, checkpoint, force)
+        return checked_run(self, t_end, {"impact": impact, **strike}, (device, precision, threads), recorders, kept)
 
     def _machine(self) -> Machine:
         from warp_mca.robots.machine import Machine

@@ -36,6 +36,8 @@ def start_of(machine: Machine, robot: Robot) -> Array:
     place = lambda key: lambda k: slice(int(ends[key][k]), int(ends[key][k + 1]))  # noqa: E731
     q = filled("Robot.qpos", robot.qpos, np.array(data.qpos), names.joints, place("q"), "joint")
     v = filled("Robot.qvel", robot.qvel, np.array(data.qvel), names.joints, place("v"), "joint")
+    if robot.keyframe is None:
+        _follow(machine, robot, q, v)
     ctrl = np.array(data.ctrl)
     for name, servo in robot.servos.items():
         ctrl[names.actuators.index(name)] = servo.target
@@ -47,6 +49,28 @@ def start_of(machine: Machine, robot: Robot) -> Array:
     _check_limits(machine, y)
     _check_loops(machine)
     return y
+
+
+def _follow(machine: Machine, robot: Robot, q: Array, v: Array) -> None:
+    """Let joints that equalities gear follow, as mimic joints of a URDF, where no start is given for them.
+
+    q_1 = q_1(0) + p(q_2 - q_2(0)) with a polynomial p.
+    """
+    model, names = machine.model, machine.names
+    kind = int(machine.mj.mjtEq.mjEQ_JOINT)
+    geared = [k for k in range(model.neq) if model.eq_active0[k] and int(model.eq_type[k]) == kind]
+    free = lambda given, k: given is None or (isinstance(given, Mapping) and names.joint(k) not in given)  # noqa: E731
+    for _ in geared:  # one may follow another one
+        for k in geared:
+            one, other = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
+            p, x, rate = np.polynomial.Polynomial(model.eq_data[k, :5]), 0.0, 0.0
+            if other >= 0:
+                place = int(model.jnt_qposadr[other])
+                x, rate = q[place] - model.qpos0[place], v[model.jnt_dofadr[other]]
+            if free(robot.qpos, one):
+                q[model.jnt_qposadr[one]] = model.qpos0[model.jnt_qposadr[one]] + p(x)
+            if free(robot.qvel, one):
+                v[model.jnt_dofadr[one]] = p.deriv()(x) * rate
 
 
 def _check_limits(machine: Machine, y: Array) -> None:

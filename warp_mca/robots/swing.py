@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 SAMPLE_COUNT = 257  # of the trajectory that is kept
 BEFORE = 1e-7  # gap at which the normal of a touch is taken [m]
 PARTING = 1e-3  # and after an impact [m]: faces of round geoms lie that deep in them, at a radius of 60 mm
+MOST_STEPS = 10_000_000  # of a swing: they take hours
+LOOK = 1000  # steps from one forecast of their number to the next
 ROUND_OFF = 1e-12  # gaps up to this at the start are closed [m]
 
 
@@ -100,10 +102,10 @@ def swing(robot: Robot, machine: Machine, pairs: Sequence[Pair], t_end: float, *
         stops: whether a touch ends it.
 
     Raises:
-        RequestError: surfaces overlap at the start, or the integration breaks off.
+        RequestError: surfaces overlap at the start, or the integration breaks off or would not end.
     """
     y = np.concatenate([machine.start, np.zeros(2)])
-    path = _Path(machine)
+    path = _Path(machine, t_end)
     watches = _watches(machine, pairs, y, robot.clock > 0.0) if stops else []
     nearby = Nearby(machine, pairs, watches, y)
     touch = next(((0.0, k) for k, watch in enumerate(watches) if watch.touching), None)
@@ -159,15 +161,15 @@ def _flow(machine: Machine, y: Array) -> Array:
 class _Path:
     """The trajectory so far: ends of its steps [s], and their dense output."""
 
-    def __init__(self, machine: Machine) -> None:
-        self._machine, self.times, self.pieces = machine, [0.0], []
+    def __init__(self, machine: Machine, t_end: float) -> None:
+        self._machine, self._t_end, self.times, self.pieces = machine, t_end, [0.0], []
         self._stepper = Stepper(machine)
 
     def advance(self, y: Array, until: float, nearby: Nearby) -> tuple[Array, tuple[float, int] | None]:
         """Go on to a time [s] or the first touch; returns the state, and time and number of the pair that touches.
 
         Raises:
-            RequestError: the integration breaks off.
+            RequestError: the integration breaks off or would not end.
         """
         machine, count, stepper = self._machine, self._machine.nq + self._machine.nv, self._stepper
         stepper.begin(self.times[-1], y, until)
@@ -183,7 +185,23 @@ class _Path:
                 self.times.append(stepper.t if touch is None else touch[0])
             if touch is not None:
                 return stepper.state(touch[0]), touch
+            if len(self.times) % LOOK == 0:
+                self._forecast(stepper.y)
         return stepper.y, None
+
+    def _forecast(self, y: Array) -> None:
+        """Refuse a swing that would not end, as of a machine that spins too fast, or whose loops lock.
+
+        Raises:
+            RequestError: steps as short as the latest ones would be too many.
+        """
+        machine, t = self._machine, self.times[-1]
+        step = (t - self.times[-LOOK]) / (LOOK - 1)
+        if len(self.times) + (self._t_end - t) / max(step, 1e-300) <= MOST_STEPS:
+            return
+        rate = float(np.abs(y[machine.nq : machine.nq + machine.nv]).max())
+        remedy = f"steps of {step:.2g} s are too short to swing to t = {self._t_end:g} s; start slower or elsewhere"
+        raise bad_value(f"greatest rate of the machine at t = {t:.3g} s [rad/s, m/s]", rate, f"{remedy}, or end sooner")
 
 
 def _touch(machine: Machine, pair: Pair, t: float, y: Array) -> Touch:

@@ -141,9 +141,9 @@ def _swapped(found: Nearest) -> Nearest:
 def pairs_of(mj: Any, robot: Robot, machine: Machine, skins: dict[str, Skin], geoms: Any) -> list[Pair]:
     """The pairs of surfaces that may touch.
 
-    Pairs of geoms are those that the file lets collide (contype, conaffinity, exclude, no parent and child); a flexible
-    link has its skin in place of its geoms, with bits of 1 where it has none. What stands beside the machine may touch
-    each of these surfaces.
+    Pairs of geoms are those that the file lets collide (contype, conaffinity, exclude, no parent and child unless its
+    flags say so), and those that it names (pair of contact); a flexible link has its skin in place of its geoms, with
+    bits of 1 where it has none. What stands beside the machine may touch each of these surfaces that has bits.
 
     Args:
         mj: the module.
@@ -155,10 +155,11 @@ def pairs_of(mj: Any, robot: Robot, machine: Machine, skins: dict[str, Skin], ge
     Raises:
         RequestError: nothing may touch, or a name is not known.
     """
-    sides = list(_own_sides(robot, machine, skins))
+    sides, named = list(_own_sides(robot, machine, skins)), _named(machine)
     found = []
     for (b, mask_b), (a, mask_a) in combinations(sides, 2):  # the outer link first: it moves against the inner one
-        if _meet(machine, a, mask_a, b, mask_b):
+        asked = any({one, other} in named for one in _geoms(machine, a) for other in _geoms(machine, b))
+        if "CONTACT" not in machine.off and (asked or _meet(machine, a, mask_a, b, mask_b)):
             found.append((a, b))
     movable = [(side, mask) for side, mask in sides if machine.model.body_weldid[side.link] != 0]
     for item in robot.against:
@@ -178,6 +179,7 @@ def _own_sides(robot: Robot, machine: Machine, skins: dict[str, Skin]) -> Iterat
     """Sides of the machine, with their bits of contype and conaffinity, shape (2,)."""
     model, names = machine.model, machine.names
     bits = np.stack([model.geom_contype, model.geom_conaffinity], axis=1)
+    named = {geom for both in _named(machine) for geom in both}
     for k in range(model.nbody):
         own = np.flatnonzero(model.geom_bodyid == k)
         if names.body(k) in robot.flexible:
@@ -185,8 +187,21 @@ def _own_sides(robot: Robot, machine: Machine, skins: dict[str, Skin]) -> Iterat
             yield Side(name=names.body(k), link=k, skin=skins[names.body(k)]), bit
             continue
         for geom in own:
-            if bits[geom].any():
+            if bits[geom].any() or int(geom) in named:
                 yield Side(name=names.geom(int(geom)), link=k, geom=int(geom)), bits[geom]
+
+
+def _named(machine: Machine) -> list[set[int]]:
+    """Numbers of the geoms of each pair that the file names."""
+    model = machine.model
+    return [{int(one), int(other)} for one, other in zip(model.pair_geom1, model.pair_geom2, strict=True)]
+
+
+def _geoms(machine: Machine, side: Side) -> list[int]:
+    """Numbers of the geoms that a side of the machine stands for."""
+    if side.geom is not None:
+        return [side.geom]
+    return np.flatnonzero(machine.model.geom_bodyid == side.link).tolist()
 
 
 def _meet(machine: Machine, a: Side, mask_a: Array, b: Side, mask_b: Array) -> bool:
@@ -198,6 +213,7 @@ def _meet(machine: Machine, a: Side, mask_a: Array, b: Side, mask_b: Array) -> b
     if (
         one
         and other
+        and "FILTERPARENT" not in machine.off
         and (
             model.body_weldid[model.body_parentid[one]] == other or model.body_weldid[model.body_parentid[other]] == one
         )

@@ -116,7 +116,7 @@ class Contact(_Springs):
             spread. "auto" chooses f from mesh, curvature,
             mass and speed, so that springs hold at most some 7 % of the energy.
         stiffness: of the spring of each slave node in place of that [N/m], whatever its faces; with two_way of each
-            node of the master too. For rigid bodies, whose cells say nothing of it.
+            node of the master and of each two edges that cross, too. For rigid bodies, whose cells say nothing of it.
         law: force along the normal over depth and stiffness. None takes `Penalty`, or `DampedPenalty` where bodies lie
             on each other under their weight, with half of critical damping up to the speeds that weight gives.
         friction: law that changes the limit mu F_n of the friction force, or several that do in turn, as

@@ -54,7 +54,8 @@ class Controller:
     """A motor whose torque a Python function gives, which is asked at intervals; between them the torque is held.
 
     One object may drive several freedoms: the function then sees all of them, in the order of the scene's joints.
-    Model files and batches take none.
+    Model files and batches take none. A run that goes on from a checkpoint repeats all calls before, so that a function
+    with a state of its own has it again, and refuses one that then gives other numbers.
 
     Attributes:
         function: called as function(t, q, rate) with the time since the start of the impact phase [s], positions [rad]

@@ -56,7 +56,7 @@ def general_passes(parts: Bodies, contact: ContactAll, index: int, velocity: Arr
     found = Pairs(body=body, face=faces, factor=factor, barred_offset=offset, barred=barred)
     item = replace(item, room=room, pairs=found)
     added = _eigenvalues(parts.mass, item, union)
-    edges = general_edges(parts.X, Inertia.of(parts), item, union, contact.penalty)
+    edges = general_edges(parts.X, Inertia.of(parts), item, union, contact)
     if edges is None:
         return [item], added
     nodes, value = edge_eigenvalues(edges, parts.mass)

@@ -13,7 +13,7 @@ from warp_mca.base.joining import AS_IS, joinable, of
 from warp_mca.kernels.contact.edge_pairs import SLOTS
 from warp_mca.physics.contact.sides import SHARP, neighbours
 from warp_mca.physics.contact.stiffness import Inertia, edge_stiffness, nearest_faces
-from warp_mca.scene import Contact
+from warp_mca.scene import Contact, ContactAll
 from warp_mca.system.contact import ContactPass, Faces
 
 BLUNT = math.radians(3.0)  # angle between the faces beside an edge from which on it may press another
@@ -169,13 +169,10 @@ def edge_pass(
     kept, met = _kept(mine, theirs), _kept(theirs, mine)
     if not (kept.any() and met.any()):
         return None
-    assert not isinstance(contact.penalty, str)  # `auto_penalty.settled` has replaced it
-    return _pass(first, slave, master, mine.some(kept), theirs.some(met), contact.penalty, inertia)
+    return _pass(first, slave, master, mine.some(kept), theirs.some(met), contact, inertia)
 
 
-def general_edges(
-    X: Array, inertia: Inertia, first: ContactPass, union: Faces, penalty: float | None
-) -> EdgePass | None:
+def general_edges(X: Array, inertia: Inertia, first: ContactPass, union: Faces, contact: ContactAll) -> EdgePass | None:
     """The pass of the edges of all bodies beside that of their nodes in a general contact.
 
     Args:
@@ -183,14 +180,14 @@ def general_edges(
         inertia: masses of the model.
         first: pass of the nodes, which knows the pairs.
         union: skins of all bodies.
-        penalty: of the contact.
+        contact: it itself.
     """
     edges = skin_edges(X, union)
     edges = edges.some(_kept(edges, edges))
     if not len(edges.node):
         return None
     assert first.pairs is not None
-    found = _pass(first, union, union, edges, edges, penalty, inertia)
+    found = _pass(first, union, union, edges, edges, contact, inertia)
     body = first.pairs.face[edges.face[:, 0]]
     return replace(found, slave_body=body, master_body=body, factor=np.sign(first.pairs.factor))
 
@@ -201,7 +198,7 @@ def _pass(
     master: Faces,
     mine: SkinEdges,
     theirs: SkinEdges,
-    penalty: float | None,
+    contact: Contact | ContactAll,
     inertia: Inertia,
 ) -> EdgePass:
     place = np.searchsorted(first.slave, mine.node[:, 0])
@@ -210,7 +207,7 @@ def _pass(
         **_shared(first),
         slave=mine.node[:, 0],
         master=np.unique(theirs.node).astype(np.int32),
-        stiffness=edge_stiffness(penalty, slave, mine.face, mine.node, inertia),
+        stiffness=edge_stiffness(contact, slave, mine.face, mine.node, inertia),
         friction_parameters=friction,
         slave_edge=mine.node,
         master_edge=theirs.node,
@@ -218,7 +215,7 @@ def _pass(
         master_beside=master.node[theirs.face].reshape(-1, 8),
         slave_size=mine.size,
         master_size=theirs.size,
-        master_stiffness=edge_stiffness(penalty, master, theirs.face, theirs.node, inertia),
+        master_stiffness=edge_stiffness(contact, master, theirs.face, theirs.node, inertia),
     )
 
 

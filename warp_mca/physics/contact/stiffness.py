@@ -9,7 +9,7 @@ import numpy as np
 from warp_mca.base.arrays import Array, Index
 from warp_mca.geometry.cell_types import is_triangle
 from warp_mca.physics.contact.sides import MAX_SIDES, find_sides
-from warp_mca.scene import Contact, RigidPlane
+from warp_mca.scene import Contact, ContactAll, RigidPlane
 
 if TYPE_CHECKING:
     from warp_mca.system.bodies import Bodies
@@ -98,19 +98,23 @@ def spring_stiffness(
     return [(factor * node_mean(faces.nodes, faces, k), factor * k) for faces, k in zip(surfaces, found, strict=True)]
 
 
-def edge_stiffness(penalty: float | None, faces: Faces, beside: Index, ends: Index, inertia: Inertia) -> Array:
+def edge_stiffness(contact: Contact | ContactAll, faces: Faces, beside: Index, ends: Index, inertia: Inertia) -> Array:
     """Penalty stiffness of edges that may cross others [N/m], shape (edge_count,).
 
     One spring alone bears a crossing, as few bear a curved contact, so the default is a share of theirs, flat faces or
     not. It is less where an end has less than a quarter of the mass of a cell beside it, as corners have.
 
     Args:
-        penalty: of the contact.
+        contact: `Contact.stiffness` is that of each edge.
         faces: of the edge's surface.
         beside: the two faces beside each edge, shape (edge_count, 2).
         ends: nodes at the ends of each edge, shape (edge_count, 2).
         inertia: of the model.
     """
+    if isinstance(contact, Contact) and contact.stiffness is not None:
+        return np.full(len(beside), contact.stiffness)
+    penalty = contact.penalty
+    assert not isinstance(penalty, str)  # `auto_penalty.settled` has replaced it
     own = SHARE * (CURVED * faces.contact if penalty is None else penalty * faces.bulk)
     quarter = 0.25 * inertia.element[faces.element[beside]].mean(axis=1)
     return own[beside].mean(axis=1) * np.minimum(1.0, inertia.node[ends].min(axis=1) / quarter)
