@@ -30,6 +30,14 @@ FLAT = 1.25  # exponent of W(d) up to which a place is flat [-]
 # edge strikes. The shorter step is needed, too: crushed cells flatten, and became unstable with 2.
 PENALTY = 10.0
 FINEST = 4.0  # times smaller than the cells there, at most: steps are as many times more [-]
+# Cells that are so many times greater than those over the crushed depth would be are told of [-]. With across=2 they
+# were 24 times on an aluminium cylinder on its side, whose greatest force was 10 % less than with 1; 7 times on a ball
+# of ABS, with 1 % less where cells were half as large.
+_FAR = 10.0
+_TOLD = (
+    "the fall crushes {name} about {depth:.2g} m deep, where its cells are {size:.2g} m, a quarter of those without: "
+    "its greatest force may depend on them; give struck a smaller size"
+)
 _WORTH = 0.7  # of their size: cells that are not smaller are left as they are [-]
 _LEAST, _MOST = 1e-5, 0.2  # depths over the height of the parts, below which all is flat and above which none is [-]
 _APART = 1e-5  # of the height of a cell, by which corners at one height are taken apart [-]
@@ -96,13 +104,16 @@ def _finer(body: Body, cells: _Cells | None, lowest: float, depth: float, struck
     if not near.any():
         return body
     usual = float(cells.size[near].mean())
-    size = max(depth / (ROWS * geometry.across), usual / FINEST) if isinstance(struck, str) else struck
+    crushed, finest = depth / (ROWS * geometry.across), usual / FINEST
+    size = max(crushed, finest) if isinstance(struck, str) else struck
     if size > _WORTH * usual:
         return body
+    told = (_TOLD.format(name=body.name, depth=depth, size=size),) if size == finest > _FAR * crushed else ()
     turn = rotation_matrix(np.array(body.rotation))
     above: Any = turn.T @ ((0.0, 0.0, lowest + max(depth, size)) - np.array(body.position))
     place = Finer(point=tuple(above.tolist()), normal=tuple(turn[2].tolist()), size=size)
-    return replace(body, geometry=replace(geometry, finer=(*geometry.finer, place)), kinematics="finite")
+    changed = replace(geometry, finer=(*geometry.finer, place), notes=(*geometry.notes, *told))
+    return replace(body, geometry=changed, kinematics="finite")
 
 
 def crushed_depth(heights: Array, work: Array, energy: float) -> tuple[float, float]:
