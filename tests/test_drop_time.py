@@ -75,3 +75,4 @@ def test_a_drop_runs_for_its_contact_or_the_passes_of_waves_if_these_take_longer
 def test_a_rigid_body_on_a_rigid_floor_takes_no_time():
     block = mca.Body(name="block", geometry=mca.Box(size=SIDES, divisions=(1, 1, 1)), material=SOFT, rigid=True)
     assert time_of(block) < 1e-6
+    assert contact_time((), (), 1.0, SPEED, None) == 0.0

@@ -33,7 +33,7 @@ _CONFINED = 1.5  # pressure over yield stress, between 1 of a column and 3 of a 
 _MARGIN = 1.25  # of the time, since shapes differ [-]
 _FIRST, _LAST, _DEPTHS = 1e-5, 0.5, 40  # depths over the height of the parts that are looked at, and their number
 _STEP = 1.02  # ratio of depths between which the section is taken
-_RIGID = 1e9  # times E that rigid bodies have, and yield stress of what never yields, over E [-]
+_RIGID = 1e20  # E* of rigid bodies, yield stress of what never yields [Pa]
 _SPLIT = np.array(((0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6)))  # hexahedra
 
 
@@ -52,7 +52,7 @@ class _Tetrahedra(NamedTuple):
 def contact_time(
     bodies: Sequence[Body], meshes: Sequence[Mesh], mass: float, speed: float, floor: Elastic | None
 ) -> float:
-    """Time for which a drop is in contact with the floor z = 0, estimated from above [s].
+    """Time for which a drop is in contact with the floor z = 0, estimated, 0 of masses without cells [s].
 
     Args:
         bodies: in their places, with their `meshes`.
@@ -60,6 +60,8 @@ def contact_time(
         floor: its material, None for a rigid one.
     """
     cells = _tetrahedra(bodies, meshes, floor)
+    if not len(cells.heights):
+        return 0.0
     top, energy = float(cells.heights.max()), 0.5 * mass * speed**2
     done, before, exponent = 0.0, (0.0, 0.0), 1.0
     column = float(cells.values[:, 0].sum()) / top**2
@@ -103,7 +105,7 @@ def _below(cells: _Tetrahedra, depth: float) -> Array:
 
 def _tetrahedra(bodies: Sequence[Body], meshes: Sequence[Mesh], floor: Elastic | None) -> _Tetrahedra:
     """The cells of all bodies that have some, by tetrahedra; other cells than hexahedra have their corners first."""
-    heights, values = [], []
+    heights, values = [np.zeros((0, 4))], [np.zeros((0, 3))]
     below = (1.0 - floor.nu**2) / floor.E if floor else 0.0
     for body, mesh in zip(bodies, meshes, strict=True):
         points = in_place(body, mesh)
@@ -114,12 +116,14 @@ def _tetrahedra(bodies: Sequence[Body], meshes: Sequence[Mesh], floor: Elastic |
         )
         at = points[np.concatenate(corners)]
         volume = np.abs(np.linalg.det(at[:, 1:] - at[:, :1])) / 6.0
-        E, nu, strength = (cell_values(body, mesh, name)[cell] for name in ("E", "nu", "yield_stress"))
-        soft = (1.0 - nu**2) / (E * (_RIGID if body.rigid else 1.0))
-        strength = np.where(np.isfinite(strength) & (not body.rigid), strength, _RIGID * E)
+        if body.rigid:
+            soft, strength = np.full(len(cell), 1.0 / _RIGID), np.full(len(cell), _RIGID)
+        else:
+            E, nu, strength = (cell_values(body, mesh, name)[cell] for name in ("E", "nu", "yield_stress"))
+            soft, strength = (1.0 - nu**2) / E, np.where(np.isfinite(strength), strength, _RIGID)
         own = np.stack([volume, volume * strength, volume * (soft + below)], axis=1)
         kept = np.isfinite(own).all(axis=1) & (volume > 0.0)
         heights.append(np.sort(at[:, :, 2], axis=1)[kept])
         values.append(own[kept])
     found = np.concatenate(heights)
-    return _Tetrahedra(found - found.min(), np.concatenate(values))
+    return _Tetrahedra(found - found.min(initial=math.inf), np.concatenate(values))

@@ -78,8 +78,7 @@ def drop_test(
         struck: greatest edge of cells where a `Cad` or an `Assembly` strikes [m]; such bodies take strains as large and
             have penalty=10 on the floor. "auto": on an edge, a corner or a round place that yields, the depth that the
             fall crushes over `across`, or a quarter of the size without; a `size` of a body stays. "off": none.
-        impact: its phase; None runs for 20 passes of a wave in metal along the diagonal of the parts, or for as long as
-            what they hold and weigh may keep them on the floor if that is more, in 400 intervals.
+        impact: its phase; None: 400 rows over 20 passes of a wave in metal along the parts, or their contact if longer.
         name, more: of the scene, with other fields of it, as `criteria`; places in space are those above the floor.
 
     Returns:
