@@ -139,10 +139,11 @@ def _near_lines(start: Array, direction: Array, skin: Array) -> tuple[NDArray[np
     radius = np.linalg.norm(skin - middle[:, None], axis=2).max(axis=1)
     c, s = middle - origin, start - origin
     reach = radius**2 + 1e-12 * float((c**2).sum(axis=1).max()) - (c**2).sum(axis=1)
-    found = []
+    found = [(np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp))]
     for part in chunks(len(start), max(1, _PAIRS // len(skin))):
         along = direction[part] @ c.T - (direction[part] * s[part]).sum(axis=1)[:, None]
         apart = (s[part] ** 2).sum(axis=1)[:, None] - 2.0 * (s[part] @ c.T) - along**2
         ray, triangle = np.nonzero(apart <= reach)
         found.append((ray + part.start, triangle))
-    return tuple(np.concatenate(column) for column in zip(*found, strict=True))
+    rays, triangles = zip(*found, strict=True)
+    return np.concatenate(rays), np.concatenate(triangles)
