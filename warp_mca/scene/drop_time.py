@@ -64,6 +64,7 @@ def contact_time(
         return 0.0
     top, energy = float(cells.heights.max()), 0.5 * mass * speed**2
     done, before, exponent = 0.0, (0.0, 0.0), 1.0
+    depth, spring = 0.0, 0.0
     column = float(cells.values[:, 0].sum()) / top**2
     for depth in np.geomspace(_FIRST * top, _LAST * top, _DEPTHS):
         force, spring = _resistance(cells, depth, column)
