@@ -227,3 +227,18 @@ def test_penalty_is_named_only_where_contact_was_touched(gap: float, penalty: bo
         mca.run(replace(scene, bodies=(scene.bodies[0], fast), impact=strict))
     assert ("penalty" in str(stopped.value)) == penalty
     assert ("float64" in str(stopped.value)) == (not penalty)
+
+
+def test_rubber_of_tetrahedra_is_not_told_of_an_element_of_hexahedra():
+    """A body of tetrahedra alone has tet10 or tet4 where hex8i, the default, is asked for."""
+    from watched import told_of
+
+    from warp_mca.watch import elements
+
+    points = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]) * 0.01
+    tetrahedron = Mesh(points=points, hexahedra=np.zeros((0, 8), np.int32), tetrahedra=np.arange(4)[None].astype("i4"))
+    rubber = mca.NeoHookean(C10=1e6, nu=0.495, rho=1000.0)
+    for geometry, warned in ((cube(1), True), (tetrahedron, False)):
+        body = replace(alone(geometry).bodies[0], material=rubber, kinematics="finite")
+        said = told_of(elements.enriched_rubber, replace(alone(geometry), bodies=(body,)))
+        assert bool(said) == warned

@@ -233,6 +233,7 @@ def test_units_belong_to_decks(tmp_path: Path, capsys: pytest.CaptureFixture[str
             "*LOAD_BODY_Z\n1,1.\n*DEFINE_CURVE\n1\n0,9810\n1e-7,9810\n",
             "goes from 0 to 1e-07 s, the run from 0 to 2e-06 s",
         ),
+        ("*CASE_BEGIN_1\n*INITIAL_VELOCITY_NODE\n101,0,0,0.\n*CASE_END_1\n", r"\*CASE_BEGIN_1 .*\*CASE_END_1"),
         ("*RIGIDWALL_PLANAR\n0\n0,0,-1,0,0,0,2.\n", "FRIC = 2 is not read"),
         ("*PART\nthird\n3,1,9\n*ELEMENT_SOLID\n9,3,1,2,4,3,5,6,8,7\n", "part 3 has no material 9"),
         ("*CONTROL_TERMINATION\n1e-6,100\n", "ENDCYC = 100 is not read"),

@@ -207,6 +207,7 @@ def test_a_command_runs_all_poses_and_names_the_worst(
             ["part.step", "--height", "1", "--checkpoint", "30w"],
             "print a scene with 'warp-mca run part.step > drop.py'",
         ),
+        (["part.step", "--pose", "all", "--figures", "none"], "--pose = 'all': its runs draw all figures"),
         (["two_link", "--height", "1"], "it is for parts (.step, .msh, ...)"),
     ],
 )

@@ -125,6 +125,18 @@ def test_a_size_given_for_the_drop_counts_for_bodies_with_their_own(block: Path)
     assert body.geometry.refined(2.0).finer[0].size == 0.25e-3  # pyright: ignore[reportAttributeAccessIssue]
 
 
+@pytest.mark.parametrize(("stress", "told"), [(45e6, False), (2e10, True)])
+def test_what_is_crushed_far_less_than_a_cell_is_told(block: Path, stress: float, told: bool):
+    """As metals are on round places: of a block with such an edge the depth is 3 um in cells of .5 mm."""
+    body = dropped(block, EDGE, material=dataclasses.replace(ABS, sigma_y=stress))
+    n = slope(body)
+    depth = math.sqrt(2.0 * n[0] * n[2] * ENERGY / stress / SIDES[1])
+    notes = [note for note in mesh_of(body).notes if "the fall crushes block" in note]
+    assert len(notes) == told
+    if told:
+        assert f"about {depth:.2g} m deep" in notes[0] and "give struck a smaller size" in notes[0]
+
+
 def test_other_words_are_refused(block: Path):
     with pytest.raises(mca.RequestError, match=r"drop_test\.struck = 'fine': choose auto, off, or a size of cells"):
         dropped(block, EDGE, "fine")

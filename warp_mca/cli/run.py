@@ -135,13 +135,14 @@ def _sweep(args: argparse.Namespace, worst: bool) -> None:
     """Carry out `--sweep`: as the command `sweep`, with the files of each run kept."""
     if args.accuracy is not None:
         raise bad_value("--accuracy", args.accuracy, "each scene of a sweep would get a model of its own; leave it out")
+    asked = ("--pose", part_script.EVERY) if worst else ("--sweep", args.sweeps[0])
     if recorders_of(args, Path()):
-        raise bad_value("--sweep", args.sweeps[0], "recorders show single runs; leave them out")
+        raise bad_value(*asked, "recorders show single runs; leave them out")
     if args.method != "mca" or args.checkpoint is not None:
-        raise bad_value("--sweep", args.sweeps[0], "its runs take no --method and no --checkpoint; leave these out")
+        raise bad_value(*asked, "its runs take no --method and no --checkpoint; leave these out")
     if args.figures == "none":
         remedy = "its runs draw all figures; leave --figures out, or use warp-mca sweep, which draws none"
-        raise bad_value("--sweep", args.sweeps[0], remedy)
+        raise bad_value(*asked, remedy)
     if args.quiet or args.json:
-        raise bad_value("--sweep", args.sweeps[0], "--quiet and --json are for single runs; leave these out")
+        raise bad_value(*asked, "--quiet and --json are for single runs; leave these out")
     sweep.sweep(args, "--sweep", args.sweeps, folders=True, worst=worst)

@@ -97,7 +97,7 @@ class Content:
                     self.mesh.take_mesh(item)
                 except ValueError as error:
                     raise ValueError(self.mesh.at(error)) from error
-            elif kind is None and any(line.strip() for _, line in item.lines):
+            elif kind is None and (rules.is_in(item.name, rules.BARE) or any(line.strip() for _, line in item.lines)):
                 unknown.setdefault(item.name, item.place)
             elif kind == "numerics":
                 own.setdefault(item.name, item.place)

@@ -53,6 +53,8 @@ HARMLESS = (
 )
 # Settings of numerics, for which the elements, contacts and time steps of this program have their own.
 NUMERICS = ("CONTROL_HOURGLASS", "HOURGLASS", "CONTROL_ACCURACY", "CONTROL_SOLID", "CONTROL_RIGID", "CONTROL_BULK_*")
+# Keywords that mean something without cards, as what stands between them holds in one case alone.
+BARE = ("CASE_*", "CASE")
 
 
 def kind(name: str) -> str | None:

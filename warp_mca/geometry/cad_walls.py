@@ -23,7 +23,7 @@ SMALLEST = 0.5  # of the size in the thinnest wall: curvature makes no smaller c
 _SHARE = 0.2  # of a face's area that may be thinner than its thickness [-]
 _RAYS, _LEAST, _MOST = 3000, 3, 40  # of a part, of a face at least and at most
 _FINE = 40.0  # triangles of the trial mesh along the diagonal, about [-]
-_PAIRS = 2_000_000  # of rays and triangles at a time
+_PAIRS = 200_000  # of rays and triangles at a time
 _TRIANGLE = 2  # number of the linear triangle in gmsh
 
 
@@ -102,30 +102,48 @@ def _through(samples: Array, skin: Array) -> Array:
     middle = samples.mean(axis=1)
     normal = np.cross(samples[:, 1] - samples[:, 0], samples[:, 2] - samples[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-    hits = [_nearest(middle, sign * normal, skin) for sign in (1.0, -1.0)]
-    (ahead, odd), (behind, odd_behind) = hits
+    (ahead, odd), (behind, odd_behind) = _nearest(middle, normal, skin)
     return np.concatenate([ahead[odd & ~odd_behind], behind[odd_behind & ~odd]])
 
 
-def _nearest(start: Array, direction: Array, skin: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Distance of the nearest triangle along each ray, and whether the ray meets an odd number of them.
+def _nearest(start: Array, direction: Array, skin: Array) -> list[tuple[Array, NDArray[np.bool_]]]:
+    """Distance of the nearest triangle along each ray, and whether the ray meets an odd number; then backwards.
 
-    Moeller and Trumbore, J. Graphics Tools 2 (1997) 21.
+    Moeller and Trumbore, J. Graphics Tools 2 (1997) 21, of the triangles whose sphere the ray's line meets.
     """
-    first, a, b = skin[:, 0], skin[:, 1] - skin[:, 0], skin[:, 2] - skin[:, 0]
     least = 1e-7 * float(np.ptp(skin.reshape(-1, 3), axis=0).max())
-    distance, odd = np.full(len(start), np.inf), np.zeros(len(start), dtype=bool)
+    ray, triangle = _near_lines(start, direction, skin)
+    first, a, b = skin[triangle, 0], skin[triangle, 1] - skin[triangle, 0], skin[triangle, 2] - skin[triangle, 0]
+    d, s = direction[ray], start[ray] - first
+    p, q = np.cross(d, b), np.cross(s, a)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        det = (a * p).sum(axis=1)
+        u, v, t = ((x * y).sum(axis=1) / det for x, y in ((s, p), (d, q), (b, q)))
+        within = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0)
+    found = []
+    for along in (t, -t):
+        hit = within & (along > least)
+        distance = np.full(len(start), np.inf)
+        np.minimum.at(distance, ray[hit], along[hit])
+        found.append((distance, np.bincount(ray[hit], minlength=len(start)) % 2 == 1))
+    return found
+
+
+def _near_lines(start: Array, direction: Array, skin: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Pairs of a ray and a triangle so near to its line that they may meet: indices, each shape (pair_count,).
+
+    |c - s|^2 - (d . (c - s))^2 of the triangle's middle c is at most the square of its radius, in matrix products.
+    """
+    origin = skin.reshape(-1, 3).mean(axis=0)
+    middle = skin.mean(axis=1)
+    radius = np.linalg.norm(skin - middle[:, None], axis=2).max(axis=1)
+    c, s = middle - origin, start - origin
+    reach = radius**2 + 1e-12 * float((c**2).sum(axis=1).max()) - (c**2).sum(axis=1)
+    found = [(np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp))]
     for part in chunks(len(start), max(1, _PAIRS // len(skin))):
-        d = direction[part][:, None]
-        p = np.cross(d, b[None])
-        det = (a[None] * p).sum(axis=2)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            s = start[part][:, None] - first[None]
-            u = (s * p).sum(axis=2) / det
-            q = np.cross(s, a[None])
-            v = (d * q).sum(axis=2) / det
-            t = (b[None] * q).sum(axis=2) / det
-            hit = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (t > least)
-        distance[part] = np.where(hit, t, np.inf).min(axis=1)
-        odd[part] = hit.sum(axis=1) % 2 == 1
-    return distance, odd
+        along = direction[part] @ c.T - (direction[part] * s[part]).sum(axis=1)[:, None]
+        apart = (s[part] ** 2).sum(axis=1)[:, None] - 2.0 * (s[part] @ c.T) - along**2
+        ray, triangle = np.nonzero(apart <= reach)
+        found.append((ray + part.start, triangle))
+    rays, triangles = zip(*found, strict=True)
+    return np.concatenate(rays), np.concatenate(triangles)

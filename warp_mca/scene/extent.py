@@ -44,13 +44,18 @@ def extent_of(bodies: Sequence[Body]) -> Extent:
     for body in bodies:
         rotation, position = rotation_matrix(np.array(body.rotation)), np.array(body.position)
         mesh = mesh_of(body)
-        points = mesh.points @ rotation.T + position
+        points = in_place(body, mesh)
         lows.append(points.min(axis=0))
         highs.append(points.max(axis=0))
         own, centre = _weight(body, mesh)
         mass += own
         moment += own * (rotation @ centre + position)
     return Extent(np.min(lows, axis=0), np.max(highs, axis=0), moment / mass, mass)
+
+
+def in_place(body: Body, mesh: Mesh) -> Array:
+    """Nodes of a body's mesh in the scene's frame [m], shape (node_count, 3), float64."""
+    return mesh.points @ rotation_matrix(np.array(body.rotation)).T + np.array(body.position)
 
 
 def mesh_of(body: Body) -> Mesh:

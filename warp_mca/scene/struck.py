@@ -19,7 +19,7 @@ from warp_mca.base.arrays import Array
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.geometry.cad_finer import Finer
 from warp_mca.scene.bodies import Body
-from warp_mca.scene.extent import cell_values
+from warp_mca.scene.extent import cell_values, in_place
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
@@ -30,6 +30,14 @@ FLAT = 1.25  # exponent of W(d) up to which a place is flat [-]
 # edge strikes. The shorter step is needed, too: crushed cells flatten, and became unstable with 2.
 PENALTY = 10.0
 FINEST = 4.0  # times smaller than the cells there, at most: steps are as many times more [-]
+# Cells that are so many times greater than those over the crushed depth would be are told of [-]. With across=2 they
+# were 24 times on an aluminium cylinder on its side, whose greatest force was 10 % less than with 1; 7 times on a ball
+# of ABS, with 1 % less where cells were half as large.
+_FAR = 10.0
+_TOLD = (
+    "the fall crushes {name} about {depth:.2g} m deep, where its cells are {size:.2g} m, a quarter of those without: "
+    "its greatest force may depend on them; give struck a smaller size"
+)
 _WORTH = 0.7  # of their size: cells that are not smaller are left as they are [-]
 _LEAST, _MOST = 1e-5, 0.2  # depths over the height of the parts, below which all is flat and above which none is [-]
 _APART = 1e-5  # of the height of a cell, by which corners at one height are taken apart [-]
@@ -53,16 +61,12 @@ def finer_where_struck(
     if struck == "off" or not drawn:
         return []
     parts = {body.name: _cells(body, mesh) for body, mesh in drawn}
-    lowest = min(float(_in_place(body, mesh)[:, 2].min()) for body, mesh in zip(bodies, meshes, strict=True))
+    lowest = min(float(in_place(body, mesh)[:, 2].min()) for body, mesh in zip(bodies, meshes, strict=True))
     heights = np.concatenate([part.heights for part in parts.values()]) - lowest
     depth, exponent = crushed_depth(heights, np.concatenate([part.work for part in parts.values()]), energy)
     depth = depth if exponent > FLAT else 0.0
     found = [_finer(body, parts.get(body.name), lowest, depth, struck) for body in bodies]
     return found if any(one is not other for one, other in zip(found, bodies, strict=True)) else []
-
-
-def _in_place(body: Body, mesh: Mesh) -> Array:
-    return mesh.points @ rotation_matrix(np.array(body.rotation)).T + np.array(body.position)
 
 
 class _Cells(NamedTuple):
@@ -83,7 +87,7 @@ def _cells(body: Body, mesh: Mesh) -> _Cells:
     from warp_mca.geometry.cell_types import TETRA10, linear_type
 
     cells = mesh.others[TETRA10.name][:, : linear_type(TETRA10.name).corners]
-    corners = _in_place(body, mesh)[cells]
+    corners = in_place(body, mesh)[cells]
     volume = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6.0
     edges = [corners[:, i] - corners[:, j] for i, j in combinations(range(4), 2)]
     size = np.mean([np.linalg.norm(edge, axis=1) for edge in edges], axis=0)
@@ -100,13 +104,16 @@ def _finer(body: Body, cells: _Cells | None, lowest: float, depth: float, struck
     if not near.any():
         return body
     usual = float(cells.size[near].mean())
-    size = max(depth / (ROWS * geometry.across), usual / FINEST) if isinstance(struck, str) else struck
+    crushed, finest = depth / (ROWS * geometry.across), usual / FINEST
+    size = max(crushed, finest) if isinstance(struck, str) else struck
     if size > _WORTH * usual:
         return body
+    told = (_TOLD.format(name=body.name, depth=depth, size=size),) if size == finest > _FAR * crushed else ()
     turn = rotation_matrix(np.array(body.rotation))
     above: Any = turn.T @ ((0.0, 0.0, lowest + max(depth, size)) - np.array(body.position))
     place = Finer(point=tuple(above.tolist()), normal=tuple(turn[2].tolist()), size=size)
-    return replace(body, geometry=replace(geometry, finer=(*geometry.finer, place)), kinematics="finite")
+    changed = replace(geometry, finer=(*geometry.finer, place), notes=(*geometry.notes, *told))
+    return replace(body, geometry=changed, kinematics="finite")
 
 
 def crushed_depth(heights: Array, work: Array, energy: float) -> tuple[float, float]:
@@ -131,16 +138,24 @@ def crushed_depth(heights: Array, work: Array, energy: float) -> tuple[float, fl
 
 
 def _work(heights: Array, work: Array, depth: float) -> float:
-    """Of crushing tetrahedra to a depth [J]: of each that share of its volume which lies below.
-
-    The share is the divided difference of (depth - z)^3, cut off at 0, over the heights z of the corners.
-    """
+    """Of crushing tetrahedra to a depth [J]: of each that share of its volume which lies below."""
     reached = heights[:, 0] < depth
-    z = heights[reached]
-    z = z + _APART * (z[:, 3:] - z[:, :1]) * np.arange(4.0)
+    share, work = shares_below(heights[reached], depth), work[reached]
+    return float((share[share > 0.0] * work[share > 0.0]).sum())  # of what never yields the work is infinite
+
+
+def shares_below(heights: Array, depth: float) -> Array:
+    """Share of the volume of tetrahedra that lies below a depth [-], shape (cell_count,), float64.
+
+    It is the divided difference of (depth - z)^3, cut off at 0, over the heights z of the corners.
+
+    Args:
+        heights: of their corners [m], rising, shape (cell_count, 4), float64; the lowest is below the depth.
+        depth: height below which volume counts [m].
+    """
+    z = heights + _APART * (heights[:, 3:] - heights[:, :1]) * np.arange(4.0)
     share = np.zeros(len(z))
     for i in range(4):
         others = [j for j in range(4) if j != i]
         share += np.maximum(depth - z[:, i], 0.0) ** 3 / np.prod(z[:, others] - z[:, i : i + 1], axis=1)
-    share, work = np.clip(share, 0.0, 1.0), work[reached]
-    return float((share[share > 0.0] * work[share > 0.0]).sum())  # of what never yields the work is infinite
+    return np.clip(share, 0.0, 1.0)

@@ -56,9 +56,11 @@ def enriched_rubber(c: Context, most: float) -> Iterator[Values]:
     stiff, soft = "is some percent too stiff,", "is too soft, and may become unstable,"
     known = {**dict.fromkeys(("hex8i", "hex8w", "hex8w3"), stiff), "tet10_mean": soft}
     for body in c.scene.bodies:
-        materials = [material for material, _ in body_materials(body, c.meshes[body.name]) if material.finite_only]
+        mesh = c.meshes[body.name]
+        materials = [material for material, _ in body_materials(body, mesh) if material.finite_only]
         nu = max((material.nu for material in materials), default=0.0)
-        if body.element in known and not body.rigid and nu > most:
+        has_some = len(mesh.hexahedra) or not body.element.startswith("hex")
+        if body.element in known and has_some and not body.rigid and nu > most:
             yield dict(body=body.name, element=body.element, does=known[body.element], nu=nu)
 
 
