@@ -92,7 +92,7 @@ def equilibrium(
     """
     search = _Search(forces, u, points, masses, held, name, energy, pattern, free)
     u, residual = u.copy(), search.residual(u)
-    released, drop, delay = 0.0, np.inf, FACTORED_DELAY if search.factors else MIN_DELAY
+    released, drop, delay = 0.0, np.inf, 0
     for _ in range(MAX_NEWTON):
         if not residual.any() or search.rests(u, residual, elastic_energy):
             return Equilibrium(u=u, released=released, remaining=0.0, evaluations=search.evaluations)
@@ -139,7 +139,7 @@ class _Search:
         motions = Motions(shape, masses @ shape / masses.sum(), masses, none if held is None else held)
         self._span, self._rigid = DIFFERENCE * motions.radius, motions.free() if free is None else free
         self._gram = np.linalg.inv(np.einsum("nck,n,ncl->kl", self._rigid, masses, self._rigid, optimize=True))
-        self.evaluations, self._diagonal, self._inverse = 0, None, None
+        self.evaluations, self._diagonal, self._inverse, self._exact = 0, None, None, False
         self._pattern = pattern
         self._colour = colours(pattern) if pattern is not None and len(u) <= MOST_NODES else None
         self.factors = self._colour is not None and self._colour.max() < MOST_COLOURS
@@ -166,7 +166,7 @@ class _Search:
         """Whether forces are so small that next to no energy [J] is free to leave, in however slender a body."""
         if self.factors and self._inverse is None:
             self._factor(u)
-        if self._inverse:  # a step more takes few evaluations
+        if self._exact:  # a step more takes few evaluations
             free = 0.5 * float((residual * self._precondition(u, residual, residual)).sum())
             return free <= 1e-3 * TOLERANCE * elastic_energy
         return self._diagonal is not None and CONDITION * self._size(residual) <= TOLERANCE * elastic_energy
@@ -181,7 +181,7 @@ class _Search:
             GuardError: the body has no stiffness against some displacement, or the iterations do not end.
         """
         step, r, start = np.zeros_like(u), residual, residual
-        z = self._precondition(u, start, r)
+        z, delay = self._precondition(u, start, r), max(delay, FACTORED_DELAY if self._exact else MIN_DELAY)
         p, rz, drops = z, float((r * z).sum()), []
         for _ in range(MAX_ITERATIONS):
             Kp = self._stiffness(u, start, p)
@@ -247,7 +247,10 @@ class _Search:
         if typical == 0.0:
             raise self.failure("it has no stiffness")
         self._diagonal = np.maximum(nodal, 1e-2 * typical)[:, None]
-        self._inverse = inverse(K, self._masses[:, 0])
+        found = inverse(K, self._masses[:, 0])
+        self.factors = found is not None
+        if found:
+            self._inverse, self._exact = found
 
     def _estimate_diagonal(self, u: Array, start: Array) -> Array:
         """Diagonal of K, mean of a node's axes [N/m], shape (node_count, 1), float64.

@@ -11,10 +11,12 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import splu
+from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
+from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee
 
 Array = NDArray[np.float64]
 
+MOST_WORK = 3e9  # multiplications of the factors of a piece
 SHIFT = 1e-7  # of the typical diagonal over the typical mass, times the masses: motions without stiffness have this
 
 
@@ -57,18 +59,50 @@ def stiffness_matrix(
     return sparse.csc_array(0.5 * (found + found.T))
 
 
-def inverse(K: sparse.csc_array, masses: Array) -> Callable[[Array], Array]:
-    """The function r -> p with K p = r, both of shape (node_count, 3), float64 [N, m]; axes without stiffness stay.
+def inverse(K: sparse.csc_array, masses: Array) -> tuple[Callable[[Array], Array], bool] | None:
+    """The function r -> p with K p = r, both of shape (node_count, 3), float64 [N, m], and whether it is exact.
+
+    Axes without stiffness stay. Pieces that are not slender, whose factors would take more than MOST_WORK, have the
+    inverse of their diagonal. None where K is not positive.
 
     masses: of the nodes [kg], shape (node_count,), float64.
     """
     diagonal = K.diagonal()
     stiff = diagonal > 0.0
-    typical = float(np.median(diagonal[stiff]))
     weight = np.repeat(np.maximum(masses, 1e-3 * masses.max()) / masses.max(), 3)
-    factors = splu(K + sparse.diags_array(np.where(stiff, SHIFT * weight, 1.0) * typical), permc_spec="MMD_AT_PLUS_A")
+    shifted = sparse.csr_array(K + sparse.diags_array(SHIFT * float(np.median(diagonal[stiff])) * weight * stiff))
+    pieces = connected_components(shifted, directed=False)[1]
+    factors, rough = [], stiff.copy()
+    for k in np.unique(pieces[stiff]):
+        mine = np.flatnonzero(pieces == k)
+        part = sparse.csr_array(shifted[mine][:, mine])
+        order = reverse_cuthill_mckee(part, symmetric_mode=True)
+        ordered = sparse.coo_array(part[order][:, order])
+        if float(_width(ordered)) ** 2 * len(mine) <= MOST_WORK:
+            try:
+                factors.append((mine[order], cholesky_banded(_band(ordered), overwrite_ab=True, lower=True)))
+            except LinAlgError:
+                return None
+            rough[mine] = False
 
     def solve(r: Array) -> Array:
-        return factors.solve(np.where(stiff, r.ravel(), 0.0)).reshape(r.shape)
+        known = r.ravel()
+        p = np.where(rough, known, 0.0) / np.where(rough, diagonal, 1.0)
+        for order, factor in factors:
+            p[order] = cho_solve_banded((factor, True), known[order])
+        return p.reshape(r.shape)
 
-    return solve
+    return solve, not rough.any()
+
+
+def _width(K: sparse.coo_array) -> int:
+    """Number of diagonals of the lower triangle that have entries."""
+    return int((K.coords[0] - K.coords[1]).max()) + 1
+
+
+def _band(K: sparse.coo_array) -> Array:
+    """These diagonals, as LAPACK takes them."""
+    i, j = K.coords
+    below, band = i >= j, np.zeros((_width(K), K.shape[0]))
+    band[(i - j)[below], j[below]] = K.data[below]
+    return band
