@@ -80,7 +80,7 @@ def inverse(K: sparse.csc_array, masses: Array) -> tuple[Callable[[Array], Array
         ordered = sparse.coo_array(part[order][:, order])
         if float(_width(ordered)) ** 2 * len(mine) <= MOST_WORK:
             try:
-                factors.append((mine[order], cholesky_banded(_band(ordered), overwrite_ab=True, lower=True)))
+                factors.append((mine[order], cholesky_banded(_band(ordered, len(mine)), overwrite_ab=True, lower=True)))
             except LinAlgError:
                 return None
             rough[mine] = False
@@ -100,9 +100,9 @@ def _width(K: sparse.coo_array) -> int:
     return int((K.coords[0] - K.coords[1]).max()) + 1
 
 
-def _band(K: sparse.coo_array) -> Array:
-    """These diagonals, as LAPACK takes them."""
+def _band(K: sparse.coo_array, count: int) -> Array:
+    """These diagonals of a matrix of `count` rows, as LAPACK takes them."""
     i, j = K.coords
-    below, band = i >= j, np.zeros((_width(K), K.shape[0]))
+    below, band = i >= j, np.zeros((_width(K), count))
     band[(i - j)[below], j[below]] = K.data[below]
     return band
