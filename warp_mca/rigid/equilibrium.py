@@ -197,7 +197,7 @@ class _Search:
             before, rz = rz, float((r * z).sum())
             p = z + (rz / before) * p
         if drops and self._inverse:  # K differs with the direction where elements yield: a Newton step more finds it
-            return step, sum(drops), len(drops)
+            return step, sum(drops) if self._exact else np.inf, len(drops)
         if len(drops) < MAX_ITERATIONS:
             raise self.failure("it has no stiffness against some displacement")
         raise self.failure(f"a linear step takes more than {MAX_ITERATIONS} iterations")
