@@ -32,7 +32,7 @@ ROBOT_MUTATIONS: dict[str, Mutation] = {
     "drives_let_go": Mutation(
         "drives of a machine do not act during an impact",
         "warp_mca/robots/drives.py",
-        "if machine.passive or not drives:",
-        "if True or not drives:",
+        'if "ACTUATION" in machine.off or not drives:',
+        "if True:",
     ),
 }
