@@ -116,7 +116,8 @@ def main() -> None:
         for found in run(todo, stored, args.processes):
             stored = found
             args.data.write_text(json.dumps(stored, indent=1) + "\n", encoding="utf-8")
-        note(args.data, args.device)
+        if not args.cases:  # the page names the device of most rows
+            note(args.data, args.device)
     write_page(stored, FOLDER)
 
 
