@@ -122,20 +122,22 @@ class Relaxation:
 
     @cached_property
     def _pattern(self) -> sparse.csr_array | None:
-        """Which nodes act on each other, those that follow others in the place of these; None with ties of skins."""
-        place = np.arange(self.model.node_count)
-        place[self.model.joint_second[self.tied]] = self.model.joint_first[self.tied]
-        return None if len(self.model.ties.slave) else self._shared(place)
+        """Which nodes act on each other: those that share an element, or a neighbour where pressures are of nodes.
 
-    def _shared(self, place: NDArray[np.integer]) -> sparse.csr_array:
-        """Which nodes share an element, or a neighbour where pressures are of nodes, each in its `place`."""
-        found = shared_elements([place[block.conn] for block in self.model.blocks], self.model.node_count)
+        Nodes that follow others are in the place of these. None with ties of skins.
+        """
+        model, place = self.model, np.arange(self.model.node_count)
+        if len(model.ties.slave):
+            return None
+        place[model.joint_second[self.tied]] = model.joint_first[self.tied]
+        found = shared_elements([place[block.conn] for block in model.blocks], model.node_count)
         by_nodes = any(stage.nodal(slice(0, 1)) is not stage.no_nodes for stage in self.solver.elements)
         return sparse.csr_array(found @ found) if by_nodes else found
 
     def _free(self, u: Array) -> Array | None:
         """Motions without strain of the pieces, as `equilibrium` takes them."""
-        model, alone = self.model, self._shared(np.arange(self.model.node_count))
+        model = self.model
+        alone = shared_elements([block.conn for block in model.blocks], model.node_count)
         first, second = model.joint_first[self.tied], model.joint_second[self.tied]
         held = self.held.copy()
         held[second] = False

@@ -117,7 +117,6 @@ class _Search:
 
     Attributes:
         evaluations: of the forces so far.
-        factors: whether K is to be factored.
     """
 
     def __init__(
@@ -142,7 +141,7 @@ class _Search:
         self.evaluations, self._diagonal, self._inverse, self._exact = 0, None, None, False
         self._pattern = pattern
         self._colour = colours(pattern) if pattern is not None and len(u) <= MOST_NODES else None
-        self.factors = self._colour is not None and self._colour.max() < MOST_COLOURS
+        self._factors = self._colour is not None and self._colour.max() < MOST_COLOURS
 
     def residual(self, u: Array) -> Array:
         """Forces that deform [N]: without those on held axes, and without net force and moment on free motions.
@@ -164,7 +163,7 @@ class _Search:
 
     def rests(self, u: Array, residual: Array, elastic_energy: float) -> bool:
         """Whether forces are so small that next to no energy [J] is free to leave, in however slender a body."""
-        if self.factors and self._inverse is None:
+        if self._factors and self._inverse is None:
             self._factor(u)
         if self._exact:  # a step more takes few evaluations
             free = 0.5 * float((residual * self._precondition(u, residual, residual)).sum())
@@ -248,7 +247,7 @@ class _Search:
             raise self.failure("it has no stiffness")
         self._diagonal = np.maximum(nodal, 1e-2 * typical)[:, None]
         found = inverse(K, self._masses[:, 0])
-        self.factors = found is not None
+        self._factors = found is not None
         if found:
             self._inverse, self._exact = found
 
