@@ -169,7 +169,7 @@ def flow_function(precision: str, law_name: str, viscous: int = 0) -> Any:
         if wp.static(viscous):
             own = R(0.0)
             if first:  # of the lanes
-                own = viscous_pressure(e, dilatation / volume, R(scale) * volume, dt, extreme_out)
+                own = viscous_pressure(e, dilatation / volume, R(scale) * volume, dt, True, extreme_out)
             pressure = pressure + R(scale) * lane_sum(own)
         return pressure
 

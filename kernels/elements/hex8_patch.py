@@ -9,27 +9,27 @@ from functools import cache, partial
 import warp as wp
 
 from warp_mca.kernels.elements.hex8_lanes import flow_function
-from warp_mca.kernels.elements.hex8_small import small_strain_function
+from warp_mca.kernels.elements.hex8_small import small_strain_function, yield_function
 from warp_mca.kernels.elements.hexahedron import LINE_SCALE, frame_functions
 from warp_mca.kernels.elements.patch_element import load_functions, sum_functions
 from warp_mca.kernels.elements.patch_kernel import PatchElement, list_element, patch_force_kernel
-from warp_mca.kernels.elements.viscosity import DILATATION, TAKEN, VISCOUS_PRESSURE
 from warp_mca.kernels.hardware.scalars import scalars
-from warp_mca.kernels.hardware.shared_memory import ROW
+from warp_mca.kernels.hardware.shared_memory import ROW, wait_for_copies
 from warp_mca.kernels.records.extremes import keep_functions
 
 wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def element(precision: str, law_name: str, viscous: int = 0) -> PatchElement:
+def element(precision: str, law_name: str, viscous: int = 0, ahead: bool = False) -> PatchElement:
     """A thread's element as if elastic, and listed if it yields: lanes then compute its bulk viscosity, too."""
     t = scalars(precision)
     R, mat33, mat83 = t.real, t.mat33, t.mat83
     plastic, flow = bool(law_name), flow_function(precision, law_name, viscous)
     load_points, load_displacements, _ = load_functions(precision)
     element_rotation, local_displacement = frame_functions(precision)
-    element_forces = small_strain_function(precision, "", viscous)
+    element_forces = small_strain_function(precision, "", viscous, ahead, listed=plastic)
+    yields_somewhere = yield_function(precision)
     _, keep_forces, *_ = sum_functions(precision)
     keep_strain, keep_volume, strain_square = keep_functions(R)
     scale = LINE_SCALE**3
@@ -53,22 +53,14 @@ def element(precision: str, law_name: str, viscous: int = 0) -> PatchElement:
         G = R(scale) * law[m, 1]
         local = local_displacement(Xl, ul, W)
         K = R(scale) * law[m, 0]
-        if wp.static(plastic and viscous):
-            theta = extreme_out[DILATATION, e]
-            pressure = extreme_out[VISCOUS_PRESSURE, e]
-            taken = extreme_out[TAKEN, e]
         f, largest = element_forces(Xl, local, W, K, G, e, m, law, dt, yielded_out, history_out, extreme_out)
         keep_forces(force_out, lane, f)
         keep_strain(e, strain_square(largest, G), extreme_out)
         yields = bool(False)
         if wp.static(plastic):
-            if R(3.0) * largest > R(scale) * R(scale) * law[m, 2] * law[m, 2]:
-                yields = bool(True)
+            yields = yields_somewhere(largest, m, law)
+            if yields:
                 yielded_out[e] = 1
-                if wp.static(viscous):  # lanes compute the element again
-                    extreme_out[DILATATION, e] = theta
-                    extreme_out[VISCOUS_PRESSURE, e] = pressure
-                    extreme_out[TAKEN, e] = taken
         return yields
 
     @wp.func
@@ -110,6 +102,8 @@ def element(precision: str, law_name: str, viscous: int = 0) -> PatchElement:
         if wp.static(plastic):
             if flows:
                 list_element(lane, listed_out)
+                if wp.static(ahead):
+                    wait_for_copies()  # which go to the place of the rotation
                 keep_rotation(W, lane, force_out)
 
     return PatchElement("hex8", load_points, load_displacements, compute_element, prepare, flow, lanes=4)

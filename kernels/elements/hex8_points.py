@@ -108,7 +108,7 @@ def points_force_kernel(precision: str, law_name: str, finite: bool, viscous: in
         mean = R(0.0)
         if wp.static(general):
             pressure = R(0.0)
-        pressure = pressure + viscous_pressure(e, theta, volume, dt, extreme_out)
+        pressure = pressure + viscous_pressure(e, theta, volume, dt, True, extreme_out)
         flag = int(0)
         if wp.static(plastic):
             flag = yielded_out[e]

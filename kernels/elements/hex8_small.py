@@ -70,12 +70,30 @@ def stress_functions(precision: str) -> tuple[Any, Any, Any, Any]:
 
 
 @cache
-def small_strain_function(precision: str, law_name: str, viscous: int = 0) -> Any:
+def yield_function(precision: str) -> Any:
+    """The function (greatest S : S / 2 of `small_strain_function`, material, law) -> whether a point yields."""
+    R, scale = scalars(precision).real, LINE_SCALE**3
+
+    @wp.func
+    def yields(largest: R, m: int, law: wp.array2d(dtype=R)):
+        return R(3.0) * largest > R(scale) * R(scale) * law[m, 2] * law[m, 2]
+
+    return yields
+
+
+@cache
+def small_strain_function(
+    precision: str, law_name: str, viscous: int = 0, ahead: bool = False, listed: bool = False
+) -> Any:
     """The function that gives the corner forces of an element, and the greatest S : S / 2 of a point.
 
     It takes corners, local displacements and frame W; the material m and its K and G; where there is a law, the history
     of element e; of a viscous one the time step and extremes. Jacobians lack the factor LINE_SCALE^3. Strains do
     not depend on it, and K, G and stresses are those of the material times this factor, so that forces are right.
+
+    Args:
+        ahead: see `viscosity_function`.
+        listed: elements that yield are computed again; their viscosity is not kept.
     """
     t = scalars(precision)
     R, mat33, mat43, mat83 = t.real, t.mat33, t.mat43, t.mat83
@@ -83,7 +101,8 @@ def small_strain_function(precision: str, law_name: str, viscous: int = 0) -> An
     _, to_lines = line_functions(precision)
     edge_to_node = node_force_function(precision)
     add_traction, symmetric_gradient, deviator, invariant = stress_functions(precision)
-    viscous_pressure, scale = viscosity_function(precision, False, viscous), LINE_SCALE**3
+    viscous_pressure, scale = viscosity_function(precision, False, viscous, ahead), LINE_SCALE**3
+    yields = yield_function(precision)
     plastic, flow_at = bool(law_name), flow_function(precision, law_name, points=8, scale=scale)
 
     @wp.func
@@ -141,7 +160,10 @@ def small_strain_function(precision: str, law_name: str, viscous: int = 0) -> An
         if wp.static(plastic):
             if flag_new != flag:
                 yielded_out[e] = flag_new
-        q = R(scale) * viscous_pressure(e, dilatation / volume, R(scale) * volume, dt, extreme_out)
+        kept = bool(True)
+        if wp.static(listed):
+            kept = not yields(largest, m, law)
+        q = R(scale) * viscous_pressure(e, dilatation / volume, R(scale) * volume, dt, kept, extreme_out)
         pressure = K * dilatation / volume + q
         Fx = to_lines(Sx + pressure * Bx)
         Fy = to_lines(Sy + pressure * By)

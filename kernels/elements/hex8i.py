@@ -94,7 +94,7 @@ def force_kernel(points: int, precision: str, law_name: str, finite: bool = Fals
             keep_strain(e, strain_square(largest, law[m, 1]), extreme_out)
         keep_volume(e, R(1.0) - J, extreme_out)
         if wp.static(viscous):
-            pressure = viscous_pressure(e, dilatation_of(H), volume, dt, extreme_out)
+            pressure = viscous_pressure(e, dilatation_of(H), volume, dt, True, extreme_out)
             P = P + nominal(H, mat33(), mat33(), vec3(), pressure)
         f = corner_forces(x, b, volume, W, P, Q)
         for a in range(8):

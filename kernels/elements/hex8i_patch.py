@@ -43,7 +43,7 @@ def keep_function(precision: str) -> Any:
 
 
 @cache
-def element(points: int, precision: str, law_name: str, viscous: int = 0) -> PatchElement:
+def element(points: int, precision: str, law_name: str, viscous: int = 0, ahead: bool = False) -> PatchElement:
     """A thread's element as if elastic, and listed if it yields: lanes then add the viscous pressure that is kept."""
     t = scalars(precision)
     R, mat73 = t.real, t.mat73
@@ -51,7 +51,7 @@ def element(points: int, precision: str, law_name: str, viscous: int = 0) -> Pat
     load_patterns, load_displacement_patterns = pattern_load_functions(precision)
     shape_and_strain, corner_forces = pattern_strain_function(precision, False), corner_force_function(precision)
     frame, elastic_stress = mode_functions(precision).frame, elastic_function(precision, points)
-    keep, viscous_pressure = keep_function(precision), viscosity_function(precision, False, viscous or 1)
+    keep, viscous_pressure = keep_function(precision), viscosity_function(precision, False, viscous or 1, ahead)
     _, keep_forces, *_ = sum_functions(precision)
     keep_strain, keep_volume, strain_square = keep_functions(R)
 
@@ -62,7 +62,7 @@ def element(points: int, precision: str, law_name: str, viscous: int = 0) -> Pat
         _b, volume, W, H, J, q = shape_and_strain(x, du)
         keep_volume(e, R(1.0) - J, extreme_out)
         if wp.static(viscous):
-            viscous_pressure(e, wp.trace(H), volume, dt, extreme_out)
+            viscous_pressure(e, wp.trace(H), volume, dt, True, extreme_out)
         keep(H, q, W, lane, force_out)
 
     @wp.func
@@ -83,7 +83,7 @@ def element(points: int, precision: str, law_name: str, viscous: int = 0) -> Pat
         b, volume, W, H, J, q = shape_and_strain(x, du)
         keep_volume(e, R(1.0) - J, extreme_out)
         if wp.static(viscous):
-            pressure = viscous_pressure(e, wp.trace(H), volume, dt, extreme_out)
+            pressure = viscous_pressure(e, wp.trace(H), volume, dt, True, extreme_out)
         flows = bool(False)
         if wp.static(plastic):
             flows = yielded_out[e] != 0

@@ -45,7 +45,7 @@ def kept(law: Law, finite: bool) -> tuple[str, ...]:
 
 
 @cache
-def stress_function(precision: str, law_name: str, finite: bool, viscous: int = 0) -> Any:
+def stress_function(precision: str, law_name: str, finite: bool, viscous: int = 0, ahead: bool = False) -> Any:
     """The function that gives stress and hourglass forces of an element, with plastic flow; it keeps the strain.
 
     A larger function, or a matrix that changes within a branch, would prevent vectorisation on a CPU.
@@ -64,7 +64,7 @@ def stress_function(precision: str, law_name: str, finite: bool, viscous: int = 
     read_amplitudes, write_amplitudes = amplitude_functions(precision, point.size)
     lost = point.size + AMPLITUDE_ROWS
     keep_strain, _, _ = keep_functions(R)
-    viscous_pressure = viscosity_function(precision, finite, viscous)
+    viscous_pressure = viscosity_function(precision, finite, viscous, ahead)
     k = law_kinematics(precision, law_name, finite)
     dilatation_of, deviator, nominal, pressure_of = k.dilatation, k.deviator, k.nominal, k.pressure
 
@@ -106,7 +106,7 @@ def stress_function(precision: str, law_name: str, finite: bool, viscous: int = 
                     yielded_out[e] = int(1)
         if wp.static(not general):
             pressure = pressure_of(K, theta)
-        pressure = pressure + viscous_pressure(e, theta, volume, dt, extreme_out)
+        pressure = pressure + viscous_pressure(e, theta, volume, dt, True, extreme_out)
         P = nominal(H, S, N, d, pressure)
         Q, stored = hourglass(q, x, volume, K, G)
         if wp.static(plastic):

@@ -15,7 +15,7 @@ wp.set_module_options({"enable_backward": False})
 
 
 @cache
-def element(precision: str, law_name: str, viscous: int = 0) -> PatchElement:
+def element(precision: str, law_name: str, viscous: int = 0, ahead: bool = False) -> PatchElement:
     """Stress, bulk viscosity, plastic flow and forces."""
     t = scalars(precision)
     R, mat73 = t.real, t.mat73
@@ -23,7 +23,7 @@ def element(precision: str, law_name: str, viscous: int = 0) -> PatchElement:
     _, keep_forces, *_ = sum_functions(precision)
     _, keep_volume, _ = keep_functions(R)
     shape_and_strain, corner_forces = pattern_strain_function(precision, False), corner_force_function(precision)
-    stress_and_flow = stress_function(precision, law_name, False, viscous)
+    stress_and_flow = stress_function(precision, law_name, False, viscous, ahead)
 
     @wp.func
     def compute_element(

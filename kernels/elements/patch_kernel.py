@@ -25,12 +25,14 @@ from warp_mca.kernels.elements.patch import (
 )
 from warp_mca.kernels.elements.patch_element import material_of, sum_functions
 from warp_mca.kernels.elements.patch_layout import PATCH, SLOTS
+from warp_mca.kernels.elements.viscosity import DILATATION, VISCOUS_READ
 from warp_mca.kernels.hardware.block import from_start
 from warp_mca.kernels.hardware.early_launch import begins_early
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.shared_memory import (
     FORCES,
     HEADS,
+    ahead_functions,
     barrier,
     head_ring,
     list_pool,
@@ -66,7 +68,7 @@ class PatchElement:
     lanes: int = 1
 
 
-Maker = Callable[[str, str, int], PatchElement]  # of a precision, a law, and what joins the pressure
+Maker = Callable[..., PatchElement]  # of a precision, a law, what joins the pressure, and whether that is read ahead
 
 
 @wp.func
@@ -121,7 +123,7 @@ def patch_force_kernel(maker: Maker, precision: str, law_name: str, viscous: int
     flowing_out has the number of elements of each patch that took the return map, shape (patch_count,), where the
     element has lanes for these.
     """
-    own = maker(precision, law_name, viscous)
+    own = maker(precision, law_name, viscous, ahead=bool(viscous))
     load_points, load_displacements, compute_element = own.load_points, own.load_displacements, own.compute
     name = f"{own.name}_patch_force"
     t = scalars(precision)
@@ -135,6 +137,7 @@ def patch_force_kernel(maker: Maker, precision: str, law_name: str, viscous: int
     early = precision == "mixed" or not lanes
     begin_turns, copy_nodes, copy_ahead, _ = copy_functions(precision)
     clear_nowhere, _, sum_patch, _ = sum_functions(precision)
+    copy_viscosity, _ = ahead_functions(precision, VISCOUS_READ)
 
     # in float32, a few registers spilled cost less than a quarter of the threads
     @wp.kernel(
@@ -183,6 +186,9 @@ def patch_force_kernel(maker: Maker, precision: str, law_name: str, viscous: int
             wait_for_copies()
             copy_places(patches, head, lane, places)
             barrier()
+            if wp.static(viscous):
+                if lane < element_count(head):
+                    copy_viscosity(extreme_out, DILATATION, e, force_pool())
             if wp.static(early):
                 copy_nodes(X, u, kept_points, next_head, lane, wp.static(slots) - first, pool)
             if lane < element_count(head):

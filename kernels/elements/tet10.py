@@ -173,7 +173,7 @@ def pressure_function(precision: str, finite: bool, mean: bool, viscous: int) ->
                 volume += weight
             theta = theta / volume
             pressure = pressure_of(K, theta)
-        return theta, pressure, volume, viscous_pressure(e, theta, volume, dt, extreme_out)
+        return theta, pressure, volume, viscous_pressure(e, theta, volume, dt, True, extreme_out)
 
     return mean_pressure
 

@@ -147,7 +147,7 @@ def force_kernel(precision: str, law_name: str, finite: bool = False, viscous: i
         pressure = R(0.0)
         for a in range(4):
             pressure += R(0.25) * pressure_of(law[m, 0], dilatation[group[a, e]])
-        pressure += viscous_pressure(e, dilatation_of(H), volume, dt, extreme_out)
+        pressure += viscous_pressure(e, dilatation_of(H), volume, dt, True, extreme_out)
         strain, N, d = deviator(H)
         keep_strain(e, wp.ddot(strain, strain), extreme_out)
         keep_volume(e, R(1.0) - J, extreme_out)

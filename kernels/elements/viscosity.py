@@ -18,12 +18,13 @@ import warp as wp
 
 from warp_mca.kernels.elements.fused import NOTHING
 from warp_mca.kernels.hardware.scalars import scalars
+from warp_mca.kernels.hardware.shared_memory import ahead_functions, shared_functions, wait_for_copies
 
 wp.set_module_options({"enable_backward": False})
 
-# Rows of the extremes of viscous elements: J - 1 and q of the latest step, energy taken, c1 rho c h and c2^2 rho h^2.
-DILATATION, VISCOUS_PRESSURE, TAKEN, LINEAR, QUADRATIC = range(3, 8)
-VISCOUS_ROWS = 8
+# Rows of the extremes of viscous elements: J - 1 and q of the latest step, c1 rho c h and c2^2 rho h^2, energy taken.
+DILATATION, VISCOUS_PRESSURE, LINEAR, QUADRATIC, TAKEN = range(3, 8)
+VISCOUS_READ, VISCOUS_ROWS = 4, 8  # of these, those that an element reads; all rows of extremes
 THERMAL = VISCOUS_ROWS  # a row behind them: 3 K e of the thermal strain e [Pa]
 VISCOUS, HEATED = 1, 2  # what joins the pressure of an element, 0 nothing: viscosity, or a thermal strain besides
 UNKNOWN = -2.0  # in place of J - 1 before the first step
@@ -57,31 +58,70 @@ def kept_pressure_function(precision: str, viscous: int) -> Any:
     return kept_pressure
 
 
-@cache
-def viscosity_function(precision: str, finite: bool, viscous: int = 1) -> Any:
-    """The function (e, J - 1, volume, dt, extreme_out) -> q [Pa], which goes with dJ; it keeps the energy taken.
+def _add(double: bool) -> str:
+    """Source of `extreme_out[TAKEN, e] += energy`; on a GPU no thread waits for the sum."""
+    name, size, word = ("double", 64, "d") if double else ("float", 32, "f")
+    return f"""
+    {name}* place = wp::address(extreme_out, {TAKEN}, e);
+#if defined(__CUDA_ARCH__)
+    asm volatile("red.global.add.f{size} [%0], %1;" :: "l"(place), "{word}"(energy) : "memory");
+#else
+    *place = *place + energy;
+#endif
+"""
 
-    Without a time step it is that of the step before; of elements that are not viscous, `NOTHING`. Where they are
+
+@cache
+def taken_function(precision: str) -> Any:
+    """The function (e, energy, extreme_out) that adds to the energy taken."""
+    R = scalars(precision).real
+
+    @wp.func_native(_add(precision == "float64"))
+    def take(e: int, energy: R, extreme_out: wp.array2d(dtype=R)): ...
+
+    return take
+
+
+@cache
+def viscosity_function(precision: str, finite: bool, viscous: int = 1, ahead: bool = False) -> Any:
+    """The function (e, J - 1, volume, dt, kept, extreme_out) -> q [Pa], which goes with dJ.
+
+    Where the result is `kept`, the function stores it and the energy taken; otherwise the element is computed again.
+    Without a time step q is that of the step before; of elements that are not viscous, `NOTHING`. Where they are
     HEATED, the pressure of the thermal strain joins it.
+
+    Args:
+        ahead: `patch_kernel` began to copy what the element of a thread reads into shared memory.
     """
-    R, thermal = scalars(precision).real, thermal_function(precision, finite)
+    R, thermal, take = scalars(precision).real, thermal_function(precision, finite), taken_function(precision)
+    pool, (_, read_ahead) = shared_functions(precision)[0], ahead_functions(precision, VISCOUS_READ)
 
     @wp.func
-    def viscous_pressure(e: int, theta: R, volume: R, dt: R, extreme_out: wp.array2d(dtype=R)):
+    def read(e: int, k: int, extreme: wp.array2d(dtype=R)):
+        if wp.static(ahead):
+            return read_ahead(pool(), k - wp.static(DILATATION))
+        return extreme[k, e]
+
+    @wp.func
+    def viscous_pressure(e: int, theta: R, volume: R, dt: R, kept: bool, extreme_out: wp.array2d(dtype=R)):
         q = R(NOTHING)
         if wp.static(viscous):
-            before = extreme_out[DILATATION, e]
+            if wp.static(ahead):
+                wait_for_copies()
+            before = read(e, DILATATION, extreme_out)
+            q_before = read(e, VISCOUS_PRESSURE, extreme_out)
             moves = dt > R(0.0)
             change = wp.where(moves and before > R(-1.5), theta - before, R(0.0))
             rate = change / wp.where(moves, dt, R(1.0))
             if wp.static(finite):
                 rate = rate / (R(1.0) + theta)
-            q = rate * (extreme_out[LINEAR, e] + extreme_out[QUADRATIC, e] * wp.max(-rate, R(0.0)))
-            q = wp.where(moves, q, extreme_out[VISCOUS_PRESSURE, e])
-            work = R(0.5) * (extreme_out[VISCOUS_PRESSURE, e] + q) * change * volume
-            extreme_out[DILATATION, e] = theta
-            extreme_out[VISCOUS_PRESSURE, e] = q
-            extreme_out[TAKEN, e] = extreme_out[TAKEN, e] + work
+            linear = read(e, LINEAR, extreme_out)
+            q = rate * (linear + read(e, QUADRATIC, extreme_out) * wp.max(-rate, R(0.0)))
+            q = wp.where(moves, q, q_before)
+            if kept:
+                extreme_out[DILATATION, e] = theta
+                extreme_out[VISCOUS_PRESSURE, e] = q
+                take(e, R(0.5) * (q_before + q) * change * volume, extreme_out)
         if wp.static(viscous == HEATED):
             q = q - thermal(e, theta, extreme_out)
         return q

@@ -80,7 +80,7 @@ def viscous_function(precision: str, law_name: str, finite: bool, viscous: int) 
     @wp.func
     def with_viscosity(f: mat63, shape: Wedge6, e: int, dt: R, extreme_out: wp.array2d(dtype=R)):
         if wp.static(viscous):
-            q = viscous_pressure(e, dilatation_of(shape.H), shape.volume, dt, extreme_out)
+            q = viscous_pressure(e, dilatation_of(shape.H), shape.volume, dt, True, extreme_out)
             P = nominal(shape.H, mat33(), mat33(), vec3(), q)
             P = P + shape.W * P
             more = mat53()

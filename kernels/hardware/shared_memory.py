@@ -94,6 +94,26 @@ def copy_pair(value: wp.array(dtype=wp.vec2i), k: int, slot: int, pool_out: wp.a
     ...
 
 
+@cache
+def ahead_functions(precision: str, size: int) -> tuple[Any, Any]:
+    """Functions of what an element reads ahead, `size` rows, in the place of its forces.
+
+    (Begin to copy rows of entry e from `first` on; read row k once the copies have arrived.) Thread and element of the
+    patch have the same number, and every thread copies and reads its own.
+    """
+    R = scalars(precision).real
+    name, width = ("float", 4) if precision == "mixed" else ("double", 8)
+    to, of = f"({name}*)pool + {{0}} * {ROW} + threadIdx.x", "wp::address(value, first + {0}, e)"
+
+    @wp.func_native("\n".join(_begin_copy(width, to.format(k), of.format(k)) for k in range(size)))
+    def copy_ahead(value: wp.array2d(dtype=R), first: int, e: int, pool: wp.uint64): ...
+
+    @wp.func_native(f"return (({name}*)pool)[k * {ROW} + threadIdx.x];")
+    def read_ahead(pool: wp.uint64, k: int) -> R: ...
+
+    return copy_ahead, read_ahead
+
+
 @wp.func_native(_begin_copy(16, "&pool_out.data[slot]", "&value.data[k]"))
 def copy_words(value: wp.array(dtype=wp.vec4i), k: int, slot: int, pool_out: wp.array(dtype=wp.vec4i)):
     """Begin to copy an entry into shared memory, past the registers."""
