@@ -20,11 +20,12 @@ from sweeping import SCENE, Losing, figures, lose_device
 import warp_mca as mca
 from warp_mca.cli.main import main
 from warp_mca.studies.sweep import TRIES
-from warp_mca.studies.sweep_job import DeviceLost, Job, check_device_after
+from warp_mca.studies.sweep_job import Job, check_device_after
 from warp_mca.studies.sweep_job import figures as summary_figures
 from warp_mca.studies.sweep_lines import read_lines
 from warp_mca.studies.sweep_plan import FULL, Plan, RunOptions, batches, differing
-from warp_mca.studies.sweep_workers import WorkerDied, Workers
+from warp_mca.studies.sweep_workers import Workers, devices_named, early_worker
+from warp_mca.studies.worker_process import DeviceLost, WorkerDied
 
 pytestmark = pytest.mark.usefixtures("no_figures")
 
@@ -309,6 +310,28 @@ def test_a_worker_whose_device_takes_no_more_work_is_replaced(tmp_path: Path):
         device, process = pool.submit(lose_device, job).result()
         assert device == "cpu"
         assert process not in (os.getpid(), int(job.flag.read_text()))
+
+
+def test_a_worker_that_begins_early_names_the_devices_and_takes_the_first_job(tmp_path: Path):
+    flag = tmp_path / "lost"
+    flag.write_text("")
+    with early_worker(RunOptions("cuda:0"), None, None, 2) as early:
+        assert early and devices_named("cpu", early.devices()) == ["cpu"]
+        with Workers(["cpu"], None, early) as pool:
+            assert pool.submit(lose_device, Losing(flag=flag)).result() == ("cpu", early.process.pid)
+    early.process.join(10.0)
+    assert not early.process.is_alive()
+
+
+@pytest.mark.parametrize(
+    ("options", "executor", "workers"),
+    [(RunOptions("cpu"), None, 2), (RunOptions("cuda"), None, 1), (RunOptions("cuda"), "dask://host:1", None)],
+)
+def test_no_worker_begins_early_where_others_or_this_process_carry_out_the_runs(
+    options: RunOptions, executor: str | None, workers: int | None
+):
+    with early_worker(options, executor, workers, 2) as early:
+        assert early is None
 
 
 def test_a_device_that_answers_is_not_lost():

@@ -5,8 +5,7 @@ from __future__ import annotations
 import logging
 import pickle
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import BrokenExecutor
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -26,7 +25,9 @@ from warp_mca.results.storage import save
 from warp_mca.scene import Scene, catalogue, model_file
 from warp_mca.step.device import answers
 from warp_mca.studies.batch import run_batch
-from warp_mca.studies.sweep_plan import RunOptions, one_line, plain
+from warp_mca.studies.sweep_plan import Plan, RunOptions, one_line, plain
+from warp_mca.studies.worker_process import DeviceLost
+from warp_mca.system.threads import thread_count
 
 Row = dict[str, Any]  # of a sweep's table, by column: texts, numbers, True or False, None
 
@@ -36,10 +37,6 @@ COMPLETE = (DONE, CRITERION)  # with figures
 # entries of a summary that rows hold otherwise
 NO_FIGURES = ("wall", "parameters", "batch", "warnings", "files", "units")
 BETWEEN = " | "  # between the warnings of a run
-
-
-class DeviceLost(BrokenExecutor):
-    """The device takes no more work of this process; another process may have it do the job."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +76,21 @@ def _received(
     for file in files:
         catalogue.load_source(file)
     return Job(numbers, pickle.loads(scenes), *rest)
+
+
+def job_of(plan: Plan, group: Sequence[int], count: int) -> Job:
+    """A batch of runs of a sweep for one of `count` workers of our own, or for others if 0."""
+    options = plan.options
+    if options.threads is None:
+        options = replace(options, threads=max(1, thread_count(None) // count) if count else 1)
+    device = "cuda:0" if options.device == "cuda" else options.device
+    return Job(
+        tuple(group),
+        tuple(plan.scenes[k] for k in group),
+        tuple(plan.run_folder(k) for k in group),
+        replace(options, device=device),
+        plan.model,
+    )
 
 
 def _meshes(job: Job) -> Mapping[str, Mesh] | None:
