@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sweeping import SCENE, Losing, figures, lose_device
+from sweeping import SCENE, TIMED, Losing, figures, lose_device
 
 import warp_mca as mca
 from warp_mca.cli.main import main
 from warp_mca.studies.sweep import TRIES
-from warp_mca.studies.sweep_job import Job, check_device_after
+from warp_mca.studies.sweep_job import BETWEEN, NO_FIGURES, Job, check_device_after
 from warp_mca.studies.sweep_job import figures as summary_figures
 from warp_mca.studies.sweep_lines import read_lines
 from warp_mca.studies.sweep_plan import FULL, Plan, RunOptions, batches, differing
@@ -235,6 +235,23 @@ def test_scenes_of_nearly_equal_meshes_share_a_model():
     assert rows[0]["dt"] == rows[1]["dt"] == rows[3]["dt"] == min(alone[k]["dt"] for k in (0, 1, 3))
     assert rows[2]["dt"] == alone[2]["dt"] and all(row["status"] == "done" for row in rows)
     assert [row["F_n_max"] for row in rows] == pytest.approx([one["F_n_max"] for one in alone], rel=0.02)
+
+
+def test_rows_of_scenes_with_paths_are_those_of_a_batch_and_only_files_need_the_stress(here: Path):
+    line = mca.Line(body="block", start=(0.001, 0.005, 0.005), end=(0.019, 0.005, 0.005))
+    path = mca.Path(name="axis", lines=(line,), spacing=0.002)
+    scenes = [replace(scene, paths=(path,)) for scene in blocks(1.0, 2.0)]
+    results = mca.run_batch(scenes)
+    assert results[1].paths[0].stress.any()
+    rows, kept = mca.sweep(scenes, batch=2), mca.sweep(scenes, batch=2, out="kept", folders=True)
+    for row, with_files, result in zip(rows, kept, results, strict=True):
+        own = {name: value for name, value in result.summary.items() if name not in NO_FIGURES}
+        expected = dict(summary_figures(own)) | {"warnings": BETWEEN.join(result.warnings) or None}
+        assert {name: row[name] for name in expected.keys() - TIMED} == {
+            n: expected[n] for n in expected.keys() - TIMED
+        }
+        assert figures([row]) == figures([with_files])
+    np.testing.assert_array_equal(mca.load(here / "kept/1").paths[0].stress, results[1].paths[0].stress)
 
 
 @pytest.mark.gpu

@@ -19,12 +19,14 @@ from warp_mca.base.errors import GuardError, McaError
 from warp_mca.base.log import LOGGER
 from warp_mca.base.outside import import_named, imported
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.phases.prepare import Request
+from warp_mca.phases.settings import settings_of
 from warp_mca.results.criteria import unmet
 from warp_mca.results.result import Result
 from warp_mca.results.storage import save
 from warp_mca.scene import Scene, catalogue, model_file
 from warp_mca.step.device import answers
-from warp_mca.studies.batch import run_batch
+from warp_mca.studies.batch import check_alike, judged
 from warp_mca.studies.sweep_plan import Plan, RunOptions, one_line, plain
 from warp_mca.studies.worker_process import DeviceLost
 from warp_mca.system.threads import thread_count
@@ -133,15 +135,12 @@ def failure(reason: str) -> Row:
 
 
 def _batch(job: Job) -> list[Result]:
+    """As `run_batch`; stress along paths is in files alone, and takes most of what a small scene records."""
     options, meshes = job.options, _meshes(job)
-    return run_batch(
-        job.scenes,
-        device=options.device,
-        precision=options.precision,
-        threads=options.threads,
-        duration=options.duration,
-        meshes=[meshes] * len(job.scenes) if meshes else None,
-    )
+    span = check_alike(job.scenes, options.duration)
+    settings = settings_of(options.device, options.precision, options.threads)
+    request = Request(span=span, settings=settings, paths=any(job.folders))
+    return judged(job.scenes, [meshes] * len(job.scenes) if meshes else None, request)
 
 
 def _alone(job: Job, k: int) -> Row:
