@@ -91,13 +91,20 @@ def early_worker(
 
 
 def _prepare(prepare: Prepare | None, options: RunOptions, workers: int | None, runs: int) -> None:
-    """Begin the helpers of a worker on a GPU with its process: each of its batches alone would be too few scenes."""
+    """Begin the helpers of a worker on a GPU with its process: each of its batches alone would be too few scenes.
+
+    They begin before the driver does, where it is known how many workers share the cores.
+    """
     from warp_mca.phases.by_helpers import begin_for
 
+    cores, share = thread_count(None), workers or (1 if options.device != "cuda" else 0)
+    if share:
+        begin_for(runs, min(options.threads or cores // share, cores))
     if prepare:
         prepare()
-    with suppress(RequestError):  # which the process that began this one raises, too
-        begin_for(runs, options.threads or thread_count(None) // (workers or len(devices_named(options.device))))
+    if not share:
+        with suppress(RequestError):  # no GPU, which the process that began this one says
+            begin_for(runs, min(options.threads or cores // len(devices_named(options.device)), cores))
 
 
 @contextmanager
