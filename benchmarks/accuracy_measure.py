@@ -22,7 +22,8 @@ from warp_mca.accuracy.plan import lighter
 from warp_mca.accuracy.prediction import INTERVAL
 from warp_mca.accuracy.variant import Variant
 from warp_mca.studies.sweep_job import check_device_after
-from warp_mca.studies.sweep_workers import WorkerDied, Workers
+from warp_mca.studies.sweep_workers import Workers
+from warp_mca.studies.worker_process import WorkerDied
 
 BATCH = 8  # scenes side by side at most
 WORK = {

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from warp_mca.studies.sweep_job import DeviceLost
+from warp_mca.studies.worker_process import DeviceLost
 
 SCENE = '''
 """A block falls on a rough plane."""

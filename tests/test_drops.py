@@ -187,7 +187,7 @@ def test_a_command_runs_all_poses_and_names_the_worst(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setattr(mca, "POSES", ("zmin", "xmin-zmin"))
-    monkeypatch.setattr("warp_mca.studies.sweep.worker_count", lambda options, workers: 1)
+    monkeypatch.setattr("warp_mca.studies.sweep.worker_count", lambda options, workers, devices: 1)
     words = ["run", "part.step", "--pose", "all", "--duration", "2e-6", *QUICK[2:], "--threads", "1"]
     assert main([*words, "--out", "poses"]) == 0
     out = capsys.readouterr().out

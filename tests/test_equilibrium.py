@@ -5,9 +5,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from impacts import Displaced, prepared
+from scipy import sparse
 from scipy.spatial.transform import Rotation
 
 import warp_mca as mca
+from warp_mca.base.blas import lapack_threads
 from warp_mca.base.errors import GuardError
 from warp_mca.model.build import build_model
 from warp_mca.phases.residual import Relaxation
@@ -15,6 +17,7 @@ from warp_mca.phases.settings import Settings
 from warp_mca.physics.elements.cells import nodal_masses
 from warp_mca.rigid.equilibrium import equilibrium
 from warp_mca.rigid.pieces import free_motions, shared_elements
+from warp_mca.rigid.stiffness import inverse
 from warp_mca.step.solver import Solver
 
 E, SIGMA_Y, E_T = 70e9, 110e6, 27e9
@@ -242,3 +245,29 @@ def test_pieces_move_without_strain_as_their_joints_let_them(joined: str, held: 
     assert np.abs(fields[fixed]).max(initial=0.0) < 1e-9
     stretch = np.einsum("ijc,ijck->ijk", X[:8] - X[:8, None], fields[:8] - fields[:8, None])
     assert np.abs(stretch).max() < 1e-9
+
+
+def test_factors_have_the_same_bits_on_any_number_of_threads():
+    """A slender lattice of springs, 12 by 9 nodes wide."""
+    threads = lapack_threads()
+    assert threads, "SciPy has no OpenBLAS here"
+    number, use = threads
+    before = number()
+    near = [sparse.csr_array(np.eye(k, k=1) + np.eye(k, k=-1) - 2.0 * np.eye(k)) for k in (12, 9, 12)]
+    ones = [sparse.eye_array(k) for k in (12, 9, 12)]
+    lattice = sparse.kron(sparse.kron(near[0], ones[1]), ones[2])
+    lattice += sparse.kron(sparse.kron(ones[0], near[1]), ones[2])
+    lattice += sparse.kron(sparse.kron(ones[0], ones[1]), near[2])
+    K = sparse.csc_array(sparse.kron(-lattice, np.array([[3.0, 1.0, 0.5], [1.0, 2.0, 0.3], [0.5, 0.3, 1.7]])))
+    r = np.random.default_rng(0).normal(size=(12 * 9 * 12, 3))
+    found = []
+    try:
+        for count in (1, 3):
+            use(count)
+            solved = inverse(K, np.ones(len(r)))
+            assert solved and solved[1] and number() == count
+            found.append(solved[0](r))
+    finally:
+        use(before)
+    np.testing.assert_allclose(K @ found[0].ravel(), r.ravel(), atol=1e-3 * np.abs(r).max())
+    assert found[0].tobytes() == found[1].tobytes()

@@ -15,16 +15,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sweeping import SCENE, Losing, figures, lose_device
+from sweeping import SCENE, TIMED, Losing, figures, lose_device
 
 import warp_mca as mca
 from warp_mca.cli.main import main
 from warp_mca.studies.sweep import TRIES
-from warp_mca.studies.sweep_job import DeviceLost, Job, check_device_after
+from warp_mca.studies.sweep_job import BETWEEN, NO_FIGURES, Job, check_device_after
 from warp_mca.studies.sweep_job import figures as summary_figures
 from warp_mca.studies.sweep_lines import read_lines
 from warp_mca.studies.sweep_plan import FULL, Plan, RunOptions, batches, differing
-from warp_mca.studies.sweep_workers import WorkerDied, Workers
+from warp_mca.studies.sweep_workers import Workers, devices_named, early_worker
+from warp_mca.studies.worker_process import DeviceLost, WorkerDied
 
 pytestmark = pytest.mark.usefixtures("no_figures")
 
@@ -236,6 +237,23 @@ def test_scenes_of_nearly_equal_meshes_share_a_model():
     assert [row["F_n_max"] for row in rows] == pytest.approx([one["F_n_max"] for one in alone], rel=0.02)
 
 
+def test_rows_of_scenes_with_paths_are_those_of_a_batch_and_only_files_need_the_stress(here: Path):
+    line = mca.Line(body="block", start=(0.001, 0.005, 0.005), end=(0.019, 0.005, 0.005))
+    path = mca.Path(name="axis", lines=(line,), spacing=0.002)
+    scenes = [replace(scene, paths=(path,)) for scene in blocks(1.0, 2.0)]
+    results = mca.run_batch(scenes)
+    assert results[1].paths[0].stress.any()
+    rows, kept = mca.sweep(scenes, batch=2), mca.sweep(scenes, batch=2, out="kept", folders=True)
+    for row, with_files, result in zip(rows, kept, results, strict=True):
+        own = {name: value for name, value in result.summary.items() if name not in NO_FIGURES}
+        expected = dict(summary_figures(own)) | {"warnings": BETWEEN.join(result.warnings) or None}
+        assert {name: row[name] for name in expected.keys() - TIMED} == {
+            n: expected[n] for n in expected.keys() - TIMED
+        }
+        assert figures([row]) == figures([with_files])
+    np.testing.assert_array_equal(mca.load(here / "kept/1").paths[0].stress, results[1].paths[0].stress)
+
+
 @pytest.mark.gpu
 def test_rows_from_a_gpu_are_those_of_a_batch():
     rows = mca.sweep(blocks(*SPEEDS), device="cuda", out="all", folders=True)
@@ -309,6 +327,28 @@ def test_a_worker_whose_device_takes_no_more_work_is_replaced(tmp_path: Path):
         device, process = pool.submit(lose_device, job).result()
         assert device == "cpu"
         assert process not in (os.getpid(), int(job.flag.read_text()))
+
+
+def test_a_worker_that_begins_early_names_the_devices_and_takes_the_first_job(tmp_path: Path):
+    flag = tmp_path / "lost"
+    flag.write_text("")
+    with early_worker(RunOptions("cuda:0"), None, None, 2) as early:
+        assert early and devices_named("cpu", early.devices()) == ["cpu"]
+        with Workers(["cpu"], None, early) as pool:
+            assert pool.submit(lose_device, Losing(flag=flag)).result() == ("cpu", early.process.pid)
+    early.process.join(10.0)
+    assert not early.process.is_alive()
+
+
+@pytest.mark.parametrize(
+    ("options", "executor", "workers"),
+    [(RunOptions("cpu"), None, 2), (RunOptions("cuda"), None, 1), (RunOptions("cuda"), "dask://host:1", None)],
+)
+def test_no_worker_begins_early_where_others_or_this_process_carry_out_the_runs(
+    options: RunOptions, executor: str | None, workers: int | None
+):
+    with early_worker(options, executor, workers, 2) as early:
+        assert early is None
 
 
 def test_a_device_that_answers_is_not_lost():

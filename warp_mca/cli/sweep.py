@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warp_mca.base.errors import CriterionError, GuardError
 from warp_mca.cli.request import parameters_given, read_requests
-from warp_mca.cli.warp_start import start_warp
+from warp_mca.cli.warp_start import RUN, start_warp
 
 if TYPE_CHECKING:
+    from warp_mca.geometry.mesh import Mesh
     from warp_mca.studies.sweep_job import Row
-    from warp_mca.studies.sweep_plan import Plan
+    from warp_mca.studies.sweep_plan import Plan, RunOptions
 
 SHOWN, WARNINGS = 40, 10  # rows and warnings that the terminal shows at most; the table has all
 
@@ -85,10 +87,44 @@ def sweep(
     """
     from warp_mca.base.progress import progress_bar
     from warp_mca.phases.rate_groups import check_multi_rate
-    from warp_mca.studies.sweep import carry_out
-    from warp_mca.studies.sweep_plan import Plan, RunOptions, parse_grid, plain
+    from warp_mca.studies.sweep_plan import RunOptions, parse_grid
+    from warp_mca.studies.sweep_workers import early_worker
 
     settings = parse_grid(option, grids, parameters_given(args))
+    options = RunOptions(args.device, args.precision, args.threads, check_multi_rate(args.multi_rate), args.duration)
+    prepare = partial(start_warp, *RUN)
+    with early_worker(options, executor, workers, len(settings), prepare) as early, progress_bar() as progress:
+        from warp_mca.studies.sweep import carry_out  # which imports what a run needs
+
+        plan, meshes = _planned(args, settings, options, folders, batch)
+        if not early:
+            start_warp()
+        rows = carry_out(
+            plan,
+            executor=executor,
+            workers=workers,
+            force=args.force,
+            meshes=meshes,
+            prepare=prepare,
+            early=early,
+            progress=progress,
+        )
+    _print(plan, rows)
+    if worst:
+        _print_worst(rows)
+    _check_done(rows)
+
+
+def _planned(
+    args: argparse.Namespace,
+    settings: Sequence[Mapping[str, str]],
+    options: RunOptions,
+    folders: bool,
+    batch: int | None,
+) -> tuple[Plan, dict[str, Mesh] | None]:
+    """The sweep that a command asks for, and the meshes of its model file."""
+    from warp_mca.studies.sweep_plan import Plan, plain
+
     requests = read_requests(args, settings)
     scenes = tuple(request.scene for request in requests)
     parameters = tuple(
@@ -96,24 +132,8 @@ def sweep(
         for scene, chosen in zip(scenes, settings, strict=True)
     )
     out = args.out or Path(f"{requests[0].label}-sweep")
-    options = RunOptions(args.device, args.precision, args.threads, check_multi_rate(args.multi_rate), args.duration)
     model = Path(args.scene).resolve() if requests[0].meshes else None
-    plan = Plan(scenes, parameters, options, model, out, folders, batch)
-    start_warp()
-    with progress_bar() as progress:
-        rows = carry_out(
-            plan,
-            executor=executor,
-            workers=workers,
-            force=args.force,
-            meshes=requests[0].meshes,
-            prepare=start_warp,
-            progress=progress,
-        )
-    _print(plan, rows)
-    if worst:
-        _print_worst(rows)
-    _check_done(rows)
+    return Plan(scenes, parameters, options, model, out, folders, batch), requests[0].meshes
 
 
 def _check_done(rows: Sequence[Row]) -> None:

@@ -40,6 +40,7 @@ class Probes:
     weight: Array
 
 
+NO_PROBES = Probes({}, np.zeros((0, MAX_CORNERS), np.int32), np.zeros((0, MAX_CORNERS)))
 Place = tuple[NDArray[np.int32], Array]  # corners of the cells around the probes of a line, and their weights
 
 
@@ -50,7 +51,7 @@ def locate(scene: Scene, model: Model, meshes: Mapping[str, Mesh]) -> Probes:
         RequestError: a probe lies outside its body.
     """
     position: dict[str, Array] = {}
-    corner, weight = [np.zeros((0, MAX_CORNERS), np.int32)], [np.zeros((0, MAX_CORNERS))]
+    corner, weight = [NO_PROBES.corner], [NO_PROBES.weight]
     boxes: dict[str, dict[str, Boxes]] = {}
     for path in scene.stress_paths:
         along = []

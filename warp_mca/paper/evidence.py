@@ -16,7 +16,8 @@ from warp_mca.results.storage import load
 from warp_mca.studies.sweep import carry_out, stored_rows
 from warp_mca.studies.sweep_job import DONE, Row
 from warp_mca.studies.sweep_plan import Plan, RunOptions, differing, run_name
-from warp_mca.studies.sweep_workers import Prepare, devices_named
+from warp_mca.studies.sweep_workers import devices_named
+from warp_mca.studies.worker_process import Prepare
 
 RUNS = "runs"  # folder of the sweep
 SHARE = 3  # runs that share a GPU: most of a run's time goes to meshes, assembly, figures and files, on the host

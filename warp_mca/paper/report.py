@@ -26,7 +26,8 @@ from warp_mca.phases.arguments import Progress
 from warp_mca.phases.every import METHOD
 from warp_mca.results.storage import folder_path, load
 from warp_mca.studies.sweep_job import DONE, Row
-from warp_mca.studies.sweep_workers import Prepare, devices_named
+from warp_mca.studies.sweep_workers import devices_named
+from warp_mca.studies.worker_process import Prepare
 
 HTML, JSON, MARKDOWN = "paper.html", "paper.json", "paper.md"
 PURE = "pure"  # folder of the comparison with finite elements alone

@@ -48,8 +48,8 @@ def prepared(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | Non
     """
     made: dict[object, Mesh] = {}
     ready: list[Prepared] = []
-    if len(scenes) >= MANY and _may_help(request.settings, meshes):
-        HELPERS.begin(request.settings.threads)
+    if _may_help(request.settings, meshes):
+        begin_for(len(scenes), request.settings.threads)
 
     def here(k: int) -> Prepared:
         own = replace(request, tell=lambda stage, _: request.tell(stage, k / len(scenes)))
@@ -66,6 +66,12 @@ def prepared(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | Non
         if k == 1 and _worth_it(ready, (time.perf_counter() - begun) * (len(scenes) - 2), request.settings, meshes):
             return [*ready, *_by_helpers(scenes[2:], Shared(scenes[:2], made), request, lambda k: here(k + 2))]
     return ready
+
+
+def begin_for(scenes: int, threads: int) -> None:
+    """Begin helpers for the threads of a run, if so many scenes are to come that they are worth their start."""
+    if scenes >= MANY and threads > 2:
+        HELPERS.begin(threads)
 
 
 def _worth_it(ready: Sequence[Prepared], left: float, settings: Settings, meshes: object) -> bool:

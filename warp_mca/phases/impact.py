@@ -228,13 +228,17 @@ class Impact:
         Raises:
             GuardError: a guard stops the last one.
         """
+        if "path_stress" in records:
+            for k, scene_run in enumerate(self.scene_runs):
+                if self.stopped[k] is None:
+                    scene_run.stress.take(written, records["path_stress"])
         if len(self.scene_runs) == 1:
             return self._hand_over(written, records)
         raised = bool(records["flag"][:, :-1].any())
         if raised:
             self.read_rest()
-        kept = {name: array.copy() if name == "flag" else array[:written].copy() for name, array in records.items()}
-        self._held.append(kept)
+        names = records.keys() - {"path_stress"}
+        self._held.append({name: records[name][: None if name == "flag" else written].copy() for name in names})
         if raised or len(self._held) >= self._sets:
             self._sets = min(self._sets + 1, SETS)
             self.read_rest()
@@ -243,18 +247,14 @@ class Impact:
         """Hand over what is held of a batch; raises as `read`."""
         held, self._held = self._held, []
         if held:
-            names = held[0].keys() - {"flag", "path_stress"}
-            joined = {name: np.concatenate([item[name] for item in held]) for name in names}
-            stress = [item["path_stress"] for item in held if "path_stress" in item]
-            self._hand_over(len(joined["partial"]), joined | {"flag": held[-1]["flag"]}, stress)
+            joined = {name: np.concatenate([item[name] for item in held]) for name in held[0].keys() - {"flag"}}
+            self._hand_over(len(joined["partial"]), joined | {"flag": held[-1]["flag"]})
 
-    def _hand_over(
-        self, written: int, records: Mapping[str, NDArray], stress: Sequence[NDArray[np.float32]] = ()
-    ) -> None:
+    def _hand_over(self, written: int, records: Mapping[str, NDArray]) -> None:
         for k, scene_run in enumerate(self.scene_runs):
             if self.stopped[k] is None:
                 try:
-                    scene_run.read(written, records, stress)
+                    scene_run.read(written, records)
                 except GuardError as error:
                     self.stopped[k] = str(error)
                     if None not in self.stopped:

@@ -108,6 +108,7 @@ class Request:
         number: of the impact in a run of several, see `Course`; None in a run of one.
         clock: wall time by stage.
         begun: told of the scene, its model and its meshes by body, each time a model is assembled.
+        paths: whether stress along paths is recorded, on which no figure and no warning depends.
     """
 
     span: float
@@ -118,6 +119,7 @@ class Request:
     number: int | None = None
     clock: Clock = field(default_factory=Clock)
     begun: Callable[[Scene, Model, Mapping[str, Mesh]], None] = lambda scene, model, meshes: None
+    paths: bool = True
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from warp_mca.phases.history_rows import Rows, history_columns, joined, phase_facts, rows_of
 from warp_mca.phases.rate_groups import rate_figures
+from warp_mca.phases.stress_rows import StressRows
 from warp_mca.physics.contact.bonds import bond_reports
 from warp_mca.physics.elements.cells import body_materials
 from warp_mca.results.joint_report import joint_reports
@@ -30,7 +31,6 @@ from warp_mca.step.state_figures import (
     rigid_extremes,
 )
 from warp_mca.system.reading import on_host
-from warp_mca.system.records import parts_of
 from warp_mca.watch.energy import spring_shares
 from warp_mca.watch.failure_report import failure_report
 from warp_mca.watch.ledger import Ledger
@@ -55,6 +55,7 @@ class SceneRun:
 
     Attributes:
         ledger: rows of its history, energy balance and guards.
+        stress: along its paths.
         looks: what is looked at of the shape of its bodies.
     """
 
@@ -84,13 +85,13 @@ class SceneRun:
         self.ready, self.steps, self.solver, self.state, self.index = ready, steps, solver, state, index
         self.probes = slice(first_probe, first_probe + len(ready.probes.corner))
         self.channels = slice(first_channel, first_channel + ready.sensors.channels)
-        tolerance = ready.scene.impact.energy_tolerance
-        framed = solver.floating.count > 0
+        tolerance, framed = ready.scene.impact.energy_tolerance, solver.floating.count > 0
         self.ledger = Ledger(ready.model, steps, tolerance, solver.precision, state.scenes[index], framed)
         self.looks = SceneLooks(solver, self.ledger, watch, index, ready.home)
+        self.stress = StressRows(self.ledger.kept, steps.checks, self.probes)
 
-    def read(self, written: int, records: Mapping[str, NDArray], stress: Sequence[NDArray[np.float32]] = ()) -> None:
-        """Take in the first `written` of the solver's records, `path_stress` in lasting parts if not among them.
+    def read(self, written: int, records: Mapping[str, NDArray]) -> None:
+        """Take in the first `written` of the solver's records.
 
         Raises:
             GuardError: a record breaks a guard; those before it count.
@@ -101,8 +102,7 @@ class SceneRun:
         finally:
             good = rows[: kept.count - first]
             if len(self.ready.probes.corner):
-                own = parts_of(stress, good, self.steps.checks) if stress else [records["path_stress"][good]]
-                kept.path_stress += [part[:, self.probes] for part in own]
+                kept.path_stress = self.stress.first(kept.count)
             if self.ready.sensors.channels:
                 kept.sensors.extend(records["sensors"][good, self.channels])
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from warp_mca.base.garbage import few_collections
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.model.paths import NO_PROBES
 from warp_mca.phases.by_helpers import Telling, prepared
 from warp_mca.phases.carry_out import Course, begin
 from warp_mca.phases.forecast import announce
@@ -37,6 +38,8 @@ def simulate(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | Non
 
     recorders, tell, clock = request.recorders, request.tell, request.clock
     ready = prepared(scenes, meshes, request)
+    if not request.paths:
+        ready = [replace(item, probes=NO_PROBES) for item in ready]
     surfaces = skins(ready[0].model, ready[0].meshes) if recorders else {}
     needs: frozenset[str] = frozenset().union(*(recorder.needs for recorder in recorders))
     impact = begin(ready, request, skins=surfaces, needs=needs)

@@ -47,7 +47,8 @@ def path_histories(probes: Probes, rings: Sequence[NDArray[np.float32]]) -> tupl
     if not probes.position:
         return ()
     ends = np.cumsum([len(position) for position in probes.position.values()])
-    parts = np.split(np.concatenate(rings), ends[:-1], axis=1)
+    whole = rings[0] if len(rings) == 1 else np.concatenate(rings)
+    parts = np.split(whole, ends[:-1], axis=1)
     return tuple(PathHistory(name, at, s) for (name, at), s in zip(probes.position.items(), parts, strict=True))
 
 

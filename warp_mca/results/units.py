@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from functools import cache
 
 # By the name of a column, the first that matches it whole. A new column needs a unit here.
 UNITS = (
@@ -23,6 +24,7 @@ UNITS = (
 )
 
 
+@cache
 def unit_of(column: str) -> str:
     """Unit of a column of the history; "1" for pure numbers.
 

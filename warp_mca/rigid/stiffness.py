@@ -14,6 +14,8 @@ from scipy import sparse
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee
 
+from warp_mca.base.blas import one_blas_thread
+
 Array = NDArray[np.float64]
 
 MOST_WORK = 3e9  # multiplications of the factors of a piece
@@ -80,7 +82,9 @@ def inverse(K: sparse.csc_array, masses: Array) -> tuple[Callable[[Array], Array
         ordered = sparse.coo_array(part[order][:, order])
         if float(_width(ordered)) ** 2 * len(mine) <= MOST_WORK:
             try:
-                factors.append((mine[order], cholesky_banded(_band(ordered, len(mine)), overwrite_ab=True, lower=True)))
+                with one_blas_thread():
+                    factor = cholesky_banded(_band(ordered, len(mine)), overwrite_ab=True, lower=True)
+                factors.append((mine[order], factor))
             except LinAlgError:
                 return None
             rough[mine] = False
@@ -88,8 +92,9 @@ def inverse(K: sparse.csc_array, masses: Array) -> tuple[Callable[[Array], Array
     def solve(r: Array) -> Array:
         known = r.ravel()
         p = np.where(rough, known, 0.0) / np.where(rough, diagonal, 1.0)
-        for order, factor in factors:
-            p[order] = cho_solve_banded((factor, True), known[order])
+        with one_blas_thread():
+            for order, factor in factors:
+                p[order] = cho_solve_banded((factor, True), known[order])
         return p.reshape(r.shape)
 
     return solve, not rough.any()

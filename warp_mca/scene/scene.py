@@ -280,6 +280,8 @@ class Scene:
     @property
     def stress_paths(self) -> tuple[Path, ...]:
         """The paths without their lines in rigid bodies, which have no stress; those that have no line left are out."""
+        if not self.rigid_names:
+            return self.paths
         kept = [[line for line in path.lines if not self.body(line.body).rigid] for path in self.paths]
         return tuple(replace(path, lines=tuple(lines)) for path, lines in zip(self.paths, kept, strict=True) if lines)
 

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import warp as wp
 
 from warp_mca.base.errors import bad_value
 
 
-def check_device(name: str) -> str:
-    """The name of a device that this machine has.
+def all_devices() -> list[str]:
+    """Names of the devices of this machine."""
+    wp.init()
+    return [str(device) for device in wp.get_devices()]
+
+
+def check_device(name: str, known: Sequence[str] | None = None) -> str:
+    """The name of a device that this machine has, of those that are `known` if another process has found them.
 
     Raises:
         RequestError: there is no such device.
     """
-    wp.init()
-    known = [str(device) for device in wp.get_devices()]
+    known = known or all_devices()
     if name not in known:
         raise bad_value("device", name, f"this machine has {', '.join(known)}")
     return name

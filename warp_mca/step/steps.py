@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 CHECK_TIME, CHECK_STEPS = 1e-6, 20  # between two check records at most, whichever is longer: [s], steps
 
@@ -65,19 +66,19 @@ class Steps:
         """Steps of the whole run."""
         return self.per_interval * self.intervals
 
-    @property
+    @cached_property
     def most(self) -> int:
         """Steps between two check records at most."""
         return max(CHECK_STEPS, int(CHECK_TIME / self.dt * (1.0 + 1e-9)))
 
-    @property
+    @cached_property
     def per_check(self) -> int:
         """Steps between two check records; fewer before the next search or output interval, where they do not fit."""
         if self.per_search > self.most:
             return _fewest(self.per_search, self.most)
         return self.per_search * _fewest(self.searches, self.most // self.per_search)
 
-    @property
+    @cached_property
     def checks(self) -> int:
         """Check records of an output interval."""
         if self.per_check > self.per_search:

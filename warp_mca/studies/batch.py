@@ -75,9 +75,14 @@ def run_batch(
     settings = settings_of(device, precision, threads)
     _check_meshes(meshes, len(scenes))
     with hold_scenes(out, len(scenes), force) as folders:
-        found = simulate(scenes, meshes, Request(span=span, settings=settings, tell=tell))
-        judged = [with_verdict(result, scene.criteria) for result, scene in zip(found, scenes, strict=True)]
-        return save_scenes(judged, folders, force)
+        return save_scenes(judged(scenes, meshes, Request(span=span, settings=settings, tell=tell)), folders, force)
+
+
+@one_at_a_time
+def judged(scenes: Sequence[Scene], meshes: Sequence[Meshes] | None, request: Request) -> list[Result]:
+    """The result of each scene, held to its criteria; arguments and errors as in `simulate`."""
+    found = simulate(scenes, meshes, request)
+    return [with_verdict(result, scene.criteria) for result, scene in zip(found, scenes, strict=True)]
 
 
 def _check_meshes(meshes: object, count: int) -> None:

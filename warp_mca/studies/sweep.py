@@ -9,7 +9,6 @@ from collections import Counter, deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from contextlib import contextmanager
-from dataclasses import replace
 
 from warp_mca.base import validate
 from warp_mca.base.errors import McaError, bad_value
@@ -22,20 +21,21 @@ from warp_mca.results.storage import check_output, folder_path
 from warp_mca.scene import Scene
 from warp_mca.scene.options import with_options
 from warp_mca.studies.sweep_columns import parameter_column
-from warp_mca.studies.sweep_job import Job, Row, failure, run_job
+from warp_mca.studies.sweep_job import Job, Row, failure, job_of, run_job
 from warp_mca.studies.sweep_plan import Plan, RunOptions, batches, differing
 from warp_mca.studies.sweep_report import write_report
 from warp_mca.studies.sweep_table import IDENTITY, SweepTable, check_identity, remove_sweep, write_identity
 from warp_mca.studies.sweep_workers import (
-    Prepare,
     check_executor,
     connected,
     devices_named,
+    early_worker,
     lost_worker,
     opened_executor,
     own_workers,
     worker_count,
 )
+from warp_mca.studies.worker_process import Prepare, Worker
 from warp_mca.system.threads import thread_count
 
 TRIES = 5  # of a run whose worker ends before it
@@ -99,7 +99,9 @@ def sweep(
     path = None if out is None else folder_path("out", out)
     options = RunOptions(device, precision, threads, check_multi_rate(multi_rate), duration)
     plan = Plan(changed, differing(changed), options, None, path, folders, batch)
-    return carry_out(plan, executor=executor, workers=workers, force=force, progress=progress)
+    _check(plan, workers)
+    with early_worker(options, executor, workers, len(changed)) as early:
+        return carry_out(plan, executor=executor, workers=workers, force=force, progress=progress, early=early)
 
 
 def carry_out(
@@ -110,6 +112,7 @@ def carry_out(
     force: bool = False,
     meshes: Mapping[str, Mesh] | None = None,
     prepare: Prepare | None = None,
+    early: Worker | None = None,
     progress: Progress | None = None,
     deadline: float = math.inf,
 ) -> list[Row]:
@@ -120,6 +123,7 @@ def carry_out(
         executor, workers, force, progress: as in `sweep`.
         meshes: of the plan's model file.
         prepare: called by each worker process before its first run.
+        early: as `early_worker` gives it.
         deadline: no run begins later than this after the call [s]; the rows of others say so, but are not in the table.
 
     Raises:
@@ -127,15 +131,16 @@ def carry_out(
     """
     tell, end = teller(progress), time.monotonic() + deadline
     check_executor(executor)
-    _check(plan, workers, local=own_workers(executor))
+    _check(plan, workers)
     groups = batches(plan, meshes)
+    devices = devices_named(plan.options.device, early and early.devices()) if own_workers(executor) else []
     with connected(executor) as given, _opened(plan, force) as table:
         left = [group for group in groups if not table.rows.keys() >= set(group)]
-        count = min(worker_count(plan.options, workers), len(groups)) if own_workers(executor) else 0
-        jobs = [_job(plan, group, count) for group in left]
+        count = min(worker_count(plan.options, workers, devices), len(groups)) if devices else 0
+        jobs = [job_of(plan, group, count) for group in left]
         if executor is None and (count > 1 or (plan.options.device != "cpu" and workers != 1)):
             given = "process"  # that a run of it ends badly is then not the end of the sweep
-        with opened_executor(given, plan.options.device, count, prepare) as (pool, limit):
+        with opened_executor(given, devices, count, prepare, early) as (pool, limit):
             _Driver(plan, pool, limit or len(jobs), table, tell, end).go_through(jobs)
         write_report(plan, rows := _all_rows(plan, table))
     return rows
@@ -156,11 +161,11 @@ def _all_rows(plan: Plan, table: SweepTable) -> list[Row]:
     return [table.rows.get(k) or {"index": k, **failure(LATE)} for k in range(len(plan.scenes))]
 
 
-def _check(plan: Plan, workers: object, local: bool) -> None:
+def _check(plan: Plan, workers: object) -> None:
     """Refuse what no run of the sweep could be carried out with.
 
     Raises:
-        RequestError: there is no such device, precision, number of threads, of workers or of scenes in a batch.
+        RequestError: there is no such precision, number of threads, of workers or of scenes in a batch.
     """
     options = plan.options
     if not plan.scenes:
@@ -173,8 +178,6 @@ def _check(plan: Plan, workers: object, local: bool) -> None:
     thread_count(options.threads)
     if options.precision not in ("mixed", "float64"):
         raise bad_value("precision", validate.brief(options.precision), "give mixed or float64")
-    if local:
-        devices_named(options.device)
     if plan.folders and plan.out is None:
         raise bad_value("folders", True, "name the folder for the files of the runs with out as well")
 
@@ -208,21 +211,6 @@ def _opened(plan: Plan, force: bool) -> Iterator[SweepTable]:
             raise
         finally:
             table.close()
-
-
-def _job(plan: Plan, group: Sequence[int], count: int) -> Job:
-    """What one of `count` workers of our own, or of others if 0, needs to know of a batch of runs."""
-    options = plan.options
-    if options.threads is None:
-        options = replace(options, threads=max(1, thread_count(None) // count) if count else 1)
-    device = "cuda:0" if options.device == "cuda" else options.device
-    return Job(
-        tuple(group),
-        tuple(plan.scenes[k] for k in group),
-        tuple(plan.run_folder(k) for k in group),
-        replace(options, device=device),
-        plan.model,
-    )
 
 
 class _Driver:

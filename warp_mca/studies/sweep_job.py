@@ -5,8 +5,7 @@ from __future__ import annotations
 import logging
 import pickle
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import BrokenExecutor
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -20,13 +19,17 @@ from warp_mca.base.errors import GuardError, McaError
 from warp_mca.base.log import LOGGER
 from warp_mca.base.outside import import_named, imported
 from warp_mca.geometry.mesh import Mesh
+from warp_mca.phases.prepare import Request
+from warp_mca.phases.settings import settings_of
 from warp_mca.results.criteria import unmet
 from warp_mca.results.result import Result
 from warp_mca.results.storage import save
 from warp_mca.scene import Scene, catalogue, model_file
 from warp_mca.step.device import answers
-from warp_mca.studies.batch import run_batch
-from warp_mca.studies.sweep_plan import RunOptions, one_line, plain
+from warp_mca.studies.batch import check_alike, judged
+from warp_mca.studies.sweep_plan import Plan, RunOptions, one_line, plain
+from warp_mca.studies.worker_process import DeviceLost
+from warp_mca.system.threads import thread_count
 
 Row = dict[str, Any]  # of a sweep's table, by column: texts, numbers, True or False, None
 
@@ -36,10 +39,6 @@ COMPLETE = (DONE, CRITERION)  # with figures
 # entries of a summary that rows hold otherwise
 NO_FIGURES = ("wall", "parameters", "batch", "warnings", "files", "units")
 BETWEEN = " | "  # between the warnings of a run
-
-
-class DeviceLost(BrokenExecutor):
-    """The device takes no more work of this process; another process may have it do the job."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +78,21 @@ def _received(
     for file in files:
         catalogue.load_source(file)
     return Job(numbers, pickle.loads(scenes), *rest)
+
+
+def job_of(plan: Plan, group: Sequence[int], count: int) -> Job:
+    """A batch of runs of a sweep for one of `count` workers of our own, or for others if 0."""
+    options = plan.options
+    if options.threads is None:
+        options = replace(options, threads=max(1, thread_count(None) // count) if count else 1)
+    device = "cuda:0" if options.device == "cuda" else options.device
+    return Job(
+        tuple(group),
+        tuple(plan.scenes[k] for k in group),
+        tuple(plan.run_folder(k) for k in group),
+        replace(options, device=device),
+        plan.model,
+    )
 
 
 def _meshes(job: Job) -> Mapping[str, Mesh] | None:
@@ -121,15 +135,12 @@ def failure(reason: str) -> Row:
 
 
 def _batch(job: Job) -> list[Result]:
+    """As `run_batch`; stress along paths is in files alone, and takes most of what a small scene records."""
     options, meshes = job.options, _meshes(job)
-    return run_batch(
-        job.scenes,
-        device=options.device,
-        precision=options.precision,
-        threads=options.threads,
-        duration=options.duration,
-        meshes=[meshes] * len(job.scenes) if meshes else None,
-    )
+    span = check_alike(job.scenes, options.duration)
+    settings = settings_of(options.device, options.precision, options.threads)
+    request = Request(span=span, settings=settings, paths=any(job.folders))
+    return judged(job.scenes, [meshes] * len(job.scenes) if meshes else None, request)
 
 
 def _alone(job: Job, k: int) -> Row:

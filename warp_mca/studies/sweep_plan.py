@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from warp_mca.scene import Body, Contact
 
 ALIKE = 0.1  # by which lengths and angles of meshes in a batch differ: its step is the least that one of them needs
-FULL = 100_000  # elements that fill a GPU: docs/measurements/options.md has the measurement
+# Elements of a batch on a GPU: each batch takes half a second besides, and a GPU without one waits for another's end.
+FULL = 250_000
 
 _Group = tuple[list[float], list[int]]  # sizes of the first scene, numbers of all
 

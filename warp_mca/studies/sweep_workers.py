@@ -2,34 +2,23 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import signal
-import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
-from contextlib import contextmanager
+from concurrent.futures import BrokenExecutor, Executor, Future
+from contextlib import contextmanager, suppress
+from functools import partial
 from importlib import import_module
-from multiprocessing import connection
 from queue import SimpleQueue
 from typing import Any
 
 from warp_mca.base import validate
-from warp_mca.base.errors import McaError, bad_value
-from warp_mca.studies.sweep_job import DeviceLost
+from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.studies.sweep_plan import RunOptions
+from warp_mca.studies.worker_process import Function, Prepare, Worker, unheard
+from warp_mca.system.threads import thread_count
 
 DASK = "dask://"
-STARTS = 5  # of a worker in turn that is killed before it is ready, after which a sweep gives up
 CONNECTING = "10s"  # at most, to a Dask scheduler
 REMEDY = "give process, dask://HOST:PORT, or in Python a concurrent.futures.Executor"
-
-Function = Callable[[Any], Any]  # of a job, which has `on(device)`
-Prepare = Callable[[], None]
-
-
-class WorkerDied(BrokenExecutor):
-    """The process that carried out a job ended before it had an answer."""
 
 
 class Here(Executor):
@@ -49,20 +38,19 @@ class Workers(Executor):
     lost: its future raises `WorkerDied`.
     """
 
-    def __init__(self, devices: Sequence[str], prepare: Prepare | None = None) -> None:
+    def __init__(self, devices: Sequence[str], prepare: Prepare | None = None, early: Worker | None = None) -> None:
         """Make ready; a process starts with its first job.
 
         Args:
             devices: of each worker.
             prepare: called by each of them first; None only keeps Warp from printing messages.
+            early: the first of them, which was begun before.
         """
-        self._workers = [_Worker(device, prepare) for device in devices]
-        self._idle: SimpleQueue[_Worker] = SimpleQueue()
-        for worker in self._workers:
+        self._workers = [Worker(prepare) if k or not early else early for k in range(len(devices))]
+        self._idle: SimpleQueue[Worker] = SimpleQueue()
+        for worker, worker.device in zip(self._workers, devices, strict=True):
             self._idle.put(worker)
-        # Workers start with the signal mask of these threads: an interrupt from the keyboard is for this process alone.
-        block = (signal.SIG_BLOCK, {signal.SIGINT})
-        self._threads = ThreadPoolExecutor(len(devices), "sweep", signal.pthread_sigmask, block)
+        self._threads = unheard(len(devices), "sweep")
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         """Have a worker carry out `fn(job)`; the job is the only argument."""
@@ -83,131 +71,62 @@ class Workers(Executor):
             self._idle.put(worker)
 
 
-class _Worker:
-    """A process and the pipe to it; used by one thread at a time, but for `end`."""
+@contextmanager
+def early_worker(
+    options: RunOptions, executor: object, workers: int | None, runs: int, prepare: Prepare | None = None
+) -> Iterator[Worker | None]:
+    """A process for the first jobs of a sweep of so many runs on a GPU, which starts while its scenes are made.
 
-    def __init__(self, device: str, prepare: Prepare | None) -> None:
-        self.device, self._prepare = device, prepare
-        self._process: Any = None
-        self._pipe: connection.Connection | None = None
-        self._ended = threading.Event()
-
-    def call(self, function: Function, job: Any) -> Any:
-        """What the process answers.
-
-        Raises:
-            WorkerDied: it ended before.
-            McaError: none can be started.
-        """
-        pipe = self._pipe if self._process and self._process.is_alive() and self._pipe else self._start()
-        try:
-            pipe.send((function, job.on(self.device)))
-            answer, error, lost = pipe.recv()
-        except (EOFError, OSError) as broken:
-            raise WorkerDied(self._how_it_ended()) from broken
-        if lost:
-            self._process.join()
-            raise WorkerDied(error)
-        if error is not None:
-            raise RuntimeError(error)
-        return answer
-
-    def end(self) -> None:
-        """Kill the process, and start none any more."""
-        self._ended.set()
-        if self._process:
-            self._process.kill()
-
-    def _start(self) -> connection.Connection:
-        """The pipe to a new process that is ready.
-
-        Raises:
-            McaError: it ends before it is, or several in turn are killed before.
-        """
-        context = multiprocessing.get_context("spawn")  # a copy of this process would share its threads and its GPU
-        why = ""
-        for _ in range(STARTS):
-            if self._ended.is_set():
-                raise WorkerDied("the sweep has ended")
-            ours, theirs = context.Pipe()
-            process = context.Process(target=_serve, args=(theirs, self._prepare), daemon=True)
-            process.start()
-            theirs.close()
-            self._process = process
-            if self._ended.is_set():  # meanwhile
-                process.kill()
-            try:
-                ours.recv()
-            except (EOFError, OSError):
-                why = self._how_it_ended()
-                if (process.exitcode or 0) >= 0:  # not killed: the next one would end the same way
-                    break
-                continue
-            self._pipe = ours
-            return ours
-        raise McaError(
-            f"worker processes end before they are ready ({why}); a script must call mca.sweep under "
-            "if __name__ == '__main__', because they read it too, or with workers=1"
-        )
-
-    def _how_it_ended(self) -> str:
-        self._process.join()
-        code = self._process.exitcode
-        return f"killed by {signal.Signals(-code).name}" if code < 0 else f"exit status {code}"
+    None where this process or other executors carry them out, or on a CPU, which it would only keep from that.
+    """
+    if options.device == "cpu" or not own_workers(executor) or (workers == 1 and executor is None):
+        yield None
+        return
+    worker = Worker(partial(_prepare, prepare, options, workers, runs))
+    worker.begin()
+    try:
+        yield worker
+    finally:
+        worker.end()
 
 
-def _serve(pipe: connection.Connection, prepare: Prepare | None) -> None:
-    """Carry out jobs until nobody sends any."""
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+def _prepare(prepare: Prepare | None, options: RunOptions, workers: int | None, runs: int) -> None:
+    """Begin the helpers of a worker on a GPU with its process: each of its batches alone would be too few scenes.
+
+    They begin before the driver does, where it is known how many workers share the cores.
+    """
+    from warp_mca.phases.by_helpers import begin_for
+
+    cores, share = thread_count(None), workers or (1 if options.device != "cuda" else 0)
+    if share:
+        begin_for(runs, min(options.threads or cores // share, cores))
     if prepare:
         prepare()
-    else:
-        import warp
-
-        warp.config.log_level = warp.LOG_WARNING
-    pipe.send(None)
-    while True:
-        try:
-            function, job = pipe.recv()
-            answer, error, lost = function(job), None, False
-        except EOFError:
-            return
-        except DeviceLost as failed:
-            answer, error, lost = None, str(failed), True
-        except Exception as wrong:  # a job whose classes cannot be imported here
-            answer, error, lost = None, f"{type(wrong).__name__}: {wrong}", False
-        pipe.send((answer, error, lost))
-        if lost:
-            return
-
-
-def _end_with_parent() -> None:
-    """End this process when the one that started it does, however that ends: nobody waits for its answer."""
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    connection.wait([parent.sentinel])
-    os._exit(1)
+    if not share:
+        with suppress(RequestError):  # no GPU, which the process that began this one says
+            begin_for(runs, min(options.threads or cores // len(devices_named(options.device)), cores))
 
 
 @contextmanager
 def opened_executor(
-    executor: Executor | str | None, device: str, count: int, prepare: Prepare | None
+    executor: Executor | str | None, devices: Sequence[str], count: int, prepare: Prepare | None, early: Worker | None
 ) -> Iterator[tuple[Executor, int | None]]:
     """An executor, and how many jobs it should have at a time (None for all).
 
     Args:
         executor: as `connected` gives it; None for this process.
-        device: of our own workers.
+        devices: which our own workers share out.
         count: their number.
-        prepare: as in `Workers`.
+        prepare, early: as in `Workers`.
     """
     if isinstance(executor, Executor):
         yield executor, None
     elif executor is None:
         yield Here(), 1
     else:
-        devices = devices_named(device)
-        with Workers([devices[k % len(devices)] for k in range(count)], prepare) as workers:
+        with Workers(
+            [devices[k % len(devices)] for k in range(count)], early.prepare if early else prepare, early
+        ) as workers:
             yield workers, 2 * count
 
 
@@ -257,28 +176,23 @@ def lost_worker(error: BaseException) -> bool:
     return isinstance(error, BrokenExecutor) or type(error).__name__ == "KilledWorker"
 
 
-def worker_count(options: RunOptions, workers: int | None) -> int:
-    """The number of workers: as asked for, or one for each GPU of the device, or as many as the cores have threads for.
-
-    Raises:
-        RequestError: there is no such device.
-    """
-    from warp_mca.system.threads import thread_count
-
-    devices = devices_named(options.device)
+def worker_count(options: RunOptions, workers: int | None, devices: Sequence[str]) -> int:
+    """The number of workers: as asked for, or one for each GPU, or as many as the cores have threads for."""
     usual = len(devices) if devices != ["cpu"] else max(1, thread_count(None) // (options.threads or 1))
     return workers or usual
 
 
-def devices_named(name: str) -> list[str]:
+def devices_named(name: str, known: Sequence[str] | None = None) -> list[str]:
     """The devices of that name: "cuda" stands for all GPUs.
+
+    Args:
+        name: as `RunOptions.device`.
+        known: those of this machine, if another process has found them; None: this one starts the driver.
 
     Raises:
         RequestError: there is none.
     """
-    import warp as wp
+    from warp_mca.step.device import all_devices, check_device
 
-    from warp_mca.step.device import check_device
-
-    wp.init()
-    return (name == "cuda" and [str(device) for device in wp.get_cuda_devices()]) or [check_device(name)]
+    found = name == "cuda" and [device for device in known or all_devices() if device.startswith("cuda")]
+    return found or [check_device(name, known)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
@@ -117,13 +117,3 @@ class SceneRecords:
 
 _EXTREMES = ("peaks", "stiffened", "passed")
 _LISTS = ("sums", "velocities", "path_stress", "sensors")
-
-
-def parts_of(parts: Sequence[NDArray], rows: NDArray[np.int_], apart: int) -> list[NDArray]:
-    """Some rows, `apart` from each other, of what stands in several parts, each shape (count, ...): no copies."""
-    found, first = [], 0
-    for part in parts:
-        own = rows[(rows >= first) & (rows < first + len(part))] - first
-        found.append(part[slice(own[0], own[-1] + 1, apart)] if len(own) else part[:0])
-        first += len(part)
-    return found
