@@ -7,7 +7,10 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from warp_mca.base import validate
+from warp_mca.base.arrays import Array
 from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.geometry.cad_cells import read_cells
 from warp_mca.geometry.cad_drawing import UNITS, diagonal, draw, explained, file_stamp, reading_time
@@ -114,8 +117,8 @@ class Cad:
         return replace(mesh, notes=(*mesh.notes, *self.notes)) if self.notes else mesh
 
 
-def extent(path: str | Path, scale: float | None = None) -> float:
-    """Diagonal of the box around the part in a CAD file [m]; `scale` as in `Cad`.
+def extent(path: str | Path, scale: float | None = None) -> Array:
+    """Sides of the box around the part in a CAD file [m], shape (3,), float64; `scale` as in `Cad`.
 
     Raises:
         RequestError: there is no such file, gmsh cannot read it, or it has no solid.
@@ -125,7 +128,8 @@ def extent(path: str | Path, scale: float | None = None) -> float:
         raise bad_value("Cad.path", str(path), "there is no such file; check the path")
     with gmsh_session(reading_time(path)) as gmsh, explained(str(path)):
         draw(gmsh, str(path))
-        return diagonal(gmsh) * (part.scale or UNITS[Path(path).suffix.lower()])
+        box = np.array(gmsh.model.getBoundingBox(-1, -1)).reshape(2, 3)
+        return (box[1] - box[0]) * (part.scale or UNITS[Path(path).suffix.lower()])
 
 
 @lru_cache(maxsize=_KEPT)
