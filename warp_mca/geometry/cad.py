@@ -12,7 +12,7 @@ import numpy as np
 from warp_mca.base import validate
 from warp_mca.base.arrays import Array
 from warp_mca.base.errors import RequestError, bad_value
-from warp_mca.geometry.cad_cells import read_cells
+from warp_mca.geometry.cad_cells import mend_slivers, read_cells
 from warp_mca.geometry.cad_drawing import UNITS, diagonal, draw, explained, file_stamp, reading_time
 from warp_mca.geometry.cad_finer import Finer, set_finer
 from warp_mca.geometry.cad_solids import chosen_solids, glued
@@ -183,6 +183,7 @@ def _meshed_by(cad: Cad, algorithms: dict[str, float]) -> Mesh:
                 set_finer(gmsh, cad.finer, coarse, scale)
                 allow(gmsh, _MESH + reading_time(path) + _ELEMENT * _FINER * coarse.cell_count)
             gmsh.model.mesh.generate(3)
+            mend_slivers(gmsh.model.mesh)
             gmsh.option.setNumber("Mesh.SecondOrderLinear", float(Path(path).suffix.lower() == ".stl"))
             gmsh.model.mesh.setOrder(2)
             if not all(len(gmsh.model.mesh.getElementTypes(*solid)) for solid in gmsh.model.getEntities(3)):
