@@ -322,3 +322,16 @@ def test_the_page_of_parts_runs(
     for number, example in enumerate(EXAMPLES):
         exec(compile(example, f"docs/parts.md, example {number + 1}", "exec"), names)
     assert {"kN" in capsys.readouterr().out, len(EXAMPLES) > 2} == {True}
+
+
+@pytest.mark.parametrize("header", [b"", b"solid of a program"])
+def test_binary_stl_files_may_have_any_header(folder: Path, tmp_path: Path, header: bytes):
+    """gmsh reads none of zeros, and takes one that begins with "solid" for text."""
+    numbers = re.findall(r"(?:normal|vertex) +(\S+) +(\S+) +(\S+)", (folder / "part.stl").read_text())
+    rows = np.array(numbers, dtype=np.float32).reshape(-1, 12)
+    facets = b"".join(row.tobytes() + b"\0\0" for row in rows)
+    file = tmp_path / "binary.stl"
+    file.write_bytes(header.ljust(80, b"\0") + len(rows).to_bytes(4, "little") + facets)
+    part = mca.Cad(file, size=12e-3, scale=1e-3)
+    assert part.volume == pytest.approx(VOLUME, rel=1e-6)
+    check(part.build(), "part")

@@ -52,3 +52,16 @@ def test_a_plate_has_no_sliver(tmp_path: Path):
     height = 3.0 * volume / np.max(area, axis=0)
     assert volume.sum() == pytest.approx(1e-9 * PHONE["glass"], rel=1e-6)
     assert height.min() > np.median(height) / 5.0
+
+
+def test_a_foil_that_takes_long_is_told_of_before_it_is_meshed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+):
+    file = write_phone(tmp_path)
+    part = mca.Cad(file, across=1.0, solids=("glass",))
+    monkeypatch.setattr("warp_mca.geometry.cad._MANY", 100.0)
+    count = part.build().cell_count
+    (told,) = caplog.messages
+    number, size = (float(told.split(word)[0].split()[-1]) for word in (" million", " m wide"))
+    assert told.startswith("phone.step gets some") and size == pytest.approx(1e-3)
+    assert number == pytest.approx(1e-6 * count, rel=0.3)
