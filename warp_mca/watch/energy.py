@@ -32,6 +32,7 @@ CROSSINGS = 4.0  # of a body by waves, after which a drive presses it as slowly 
 STILL = 1e-6  # share of a relative velocity along the normal up to which bodies do not approach each other
 WEIGHT = 2.0  # times the weight of all bodies: a contact at rest of no more force bears it
 _LANDED, _ALIKE = 0.95, 1e-3  # least share of the shadow of a body that lands flat, most difference of its speeds [-]
+_PLASTIC = 0.03  # of the exchanged energy: more plastic work limits the force
 WEAK = 0.7  # force of a flat contact over that of one wave below which springs that were given are softer than waves
 
 
@@ -157,7 +158,9 @@ def spring_shares(
             share = float(held[greatest] / exchanged[greatest])
             flat = contact if isinstance(contact, Contact) and k not in curved else None
             edges, loss = flat is not None and on_edges(c, k, depths), PEAK_LOSS * share
-            if (landed := _loss_of_landing(c, k, float(force[greatest]), energy["plastic"], depths)) is not None:
+            hard = energy["plastic"][greatest] <= _PLASTIC * exchanged[greatest]
+            landed = _loss_of_landing(c, k, float(force[greatest]), depths) if hard else None
+            if landed is not None:
                 loss = landed
             elif flat is not None and not edges:
                 in_series = float(energy["contact"][greatest] / series[greatest]) if series[greatest] > 0.0 else 0.0
@@ -221,19 +224,24 @@ def _loss_of_flat(
     return PEAK_LOSS * share if given and force < WEAK * wave else 0.0
 
 
-def _loss_of_landing(c: Context, k: int, force: float, plastic: Array, depths: Sequence[Array]) -> float | None:
-    """Relative loss of the peak of contact k, of an elastic body that lands with its whole shadow on a rigid plane.
+def _loss_of_landing(c: Context, k: int, force: float, depths: Sequence[Array]) -> float | None:
+    """Relative loss of the peak of contact k, of a body that does not yield and lands on a plane with all its shadow.
 
     At first it presses with Z v A, whatever is behind; springs that are softer than a thin wall do not come to that
-    before waves are back. None of other contacts.
+    before waves are back. None of other contacts, and where more than a wave presses.
     """
     own = [(item, depth) for item, depth in zip(c.model.passes, depths, strict=True) if item.contact == k]
     contact = c.scene.contacts[k]
-    if not isinstance(contact, Contact) or len(own) != 1 or own[0][0].plane is None or plastic.max() > 0.0:
+    if not isinstance(contact, Contact) or len(own) != 1 or own[0][0].plane is None:
         return None
     (item, depth), normal, body = own[0], c.model.contact_axes[k, 0], contact.slave.body
     speed, wave = c.model.V[c.nodes(body)] @ normal, _wave_force(c, k, contact, 0.0)
-    if math.isinf(wave) or not depth.any() or np.ptp(speed) > _ALIKE * np.abs(speed).max():
+    if (
+        math.isinf(wave)
+        or force > WAVE[False] * wave
+        or not depth.any()
+        or np.ptp(speed) > _ALIKE * np.abs(speed).max()
+    ):
         return None
     pressed = item.slave[depth.reshape(len(item.slave), -1).max(axis=1) > 0.0]
     faces = item.slave_face[np.isin(item.slave_face, pressed).all(axis=1)]
