@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import warp as wp
-from impacts import finished, momentum, result_of
+from impacts import finished, momentum, prepared, result_of
 from scipy.optimize import minimize
 
 import warp_mca as mca
 from warp_mca.kernels.contact import contact, search
 from warp_mca.kernels.contact.friction import release, stick_slip
 from warp_mca.kernels.contact.projection import bilinear, closest_point, interpolate, shape
+from warp_mca.phases.division import divide
 from warp_mca.physics.contact.surfaces import contact_passes, make_faces
 
 SOFT = mca.Elastic(E=1e9, nu=0.2, rho=1000.0)
@@ -339,6 +340,19 @@ def test_node_that_outruns_the_search_stops_the_run(monkeypatch):
     slow = mca.Scene(**{**vars(scene), "impact": mca.ImpactPhase(duration=4e-3, output_interval=4e-3)})
     with pytest.raises(mca.GuardError, match="outran the contact search"):
         mca.run(slow)
+
+
+@pytest.mark.parametrize("share", [0.13, 0.23, 0.3, 0.45])
+def test_a_search_that_holds_for_several_intervals_lets_bodies_get_eight_times_as_fast(share: float):
+    """The loose cover of a phone, which is thrown off, got 4.5 times the speed of its fall and stopped the run."""
+    model = prepared(two_boxes()).model
+    (found,) = model.passes
+    speed, way = float(np.linalg.norm((0.7, -2.0, 0.3))), 0.5 * found.margin
+    scene = replace(two_boxes(), impact=mca.ImpactPhase(duration=1.0, output_interval=share * way / (4.0 * speed)))
+    steps = divide(scene, model, 1.0)
+    held = steps.intervals_per_search * steps.interval
+    assert 4.0 * speed * held <= way
+    assert steps.intervals_per_search == 1 or 8.0 * speed * held <= way
 
 
 def test_deep_penetration_stops_the_run():

@@ -15,6 +15,7 @@ from parts import write_parts
 
 import warp_mca as mca
 from warp_mca.geometry import cad, cad_drawing
+from warp_mca.geometry import gmsh_session as gmsh_session_module
 from warp_mca.geometry.gmsh_session import LIMIT, gmsh_session
 from warp_mca.geometry.quality import check
 
@@ -67,7 +68,11 @@ def gone(process: int) -> bool:
         ("os.kill(os.getpid(), signal.SIGSEGV)", "SIGSEGV"),
         ("os._exit(3)", "exit status 3"),
         ("raise Exception('no\\nsuch entity.')", "(no such entity); repair the part"),
-        (BUSY, "it took more than 0.5 s, as damaged files may make it; the environment variable WARP_MCA_MESH_TIME=5 "),
+        (
+            BUSY,
+            "it took more than 0.5 s of processor time, as damaged files may make it; the environment variable "
+            "WARP_MCA_MESH_TIME=5 ",
+        ),
     ],
 )
 def test_what_goes_wrong_in_gmsh_is_one_sentence(gmsh_that, monkeypatch: pytest.MonkeyPatch, merge: str, words: str):
@@ -98,6 +103,17 @@ def test_a_command_that_is_stopped_takes_gmsh_with_it(gmsh_that, number: signal.
     assert command.stderr is not None
     assert command.stderr.read().count("\n") == (status > 0)
     assert gone(int(text))
+
+
+def test_the_limit_counts_processor_time(gmsh_that, monkeypatch: pytest.MonkeyPatch):
+    """On a loaded machine gmsh waits for its turn: a second of it with none of the processor is not counted."""
+    gmsh_that("__import__('time').sleep(1.0); raise Exception('done waiting')")
+    monkeypatch.setenv(LIMIT, "0.5")
+    with pytest.raises(mca.RequestError, match="done waiting"):
+        mca.Cad("a.step", size=1.0).build()
+    monkeypatch.setattr(gmsh_session_module, "_IDLE", 0.5)  # of what waits for ever the clock's is
+    with pytest.raises(mca.RequestError, match=r"it took more than 0\.25 s, as damaged files"):
+        mca.Cad("a.step", size=1.0).build()
 
 
 @pytest.mark.parametrize("text", ["", "0", "-1", "nan", "soon"])

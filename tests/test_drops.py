@@ -239,3 +239,45 @@ def test_the_script_of_an_assembly_lists_what_it_holds(
     scene = mca.make_scene("phone_drop.py", height=HEIGHT, pose="edge", material="ABS", across=0.3)
     assert len(scene.bodies) == 6 and all(body.material == mca.library.ABS for body in scene.bodies)
     assert scene.parameters["height"] == HEIGHT
+
+
+MILLI = "SI_UNIT(.MILLI.,.METRE.)"
+INCH = """( CONVERSION_BASED_UNIT('INCH',#9002) LENGTH_UNIT() NAMED_UNIT(#9003) );
+#9001 = ( LENGTH_UNIT() NAMED_UNIT(*) SI_UNIT(.MILLI.,.METRE.) );
+#9002 = LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(25.4),#9001);
+#9003 = DIMENSIONAL_EXPONENTS(1.,0.,0.,0.,0.,0.,0.);"""
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "unit"),
+    [
+        ("part.step", "", "", 1e-3),
+        ("part.step", MILLI, "SI_UNIT($,.METRE.)", 1.0),
+        ("part.step", f"( LENGTH_UNIT() NAMED_UNIT(*) {MILLI} );", INCH, 0.0254),
+        ("part.iges", "2,2HMM", "1,2HIN", 0.0254),
+    ],
+)
+def test_a_script_says_the_size_of_a_file_that_names_its_unit(
+    folder: Path, capsys: pytest.CaptureFixture[str], name: str, old: str, new: str, unit: float
+):
+    text = (folder / name).read_text()
+    assert old in text
+    (folder / name).write_text(text.replace(old, new, 1))
+    assert main(["run", name]) == 0
+    out, err = capsys.readouterr()
+    size = " x ".join(f"{side * unit:.3g}" for side in (40.0, 20.0, 40.0))
+    assert f"  # {size} m, by the unit that the file names\n" in out and f"{name} is {size} m" in err
+    Path("drop.py").write_text(out)
+    (points,) = (mesh.points for mesh in mca.mesh(mca.make_scene("drop.py")).values())
+    assert np.ptp(points, axis=0) == pytest.approx([40.0 * unit, 20.0 * unit, 40.0 * unit])
+
+
+def test_the_unit_of_a_file_that_names_none_is_told_and_can_be_given(folder: Path, capsys: pytest.CaptureFixture[str]):
+    words = ["run", "part.stl", "--height", "1", *QUICK]
+    assert main([*words, "--quiet", "--out", "guess"]) == 0
+    told = "part.stl is 0.04 x 0.02 x 0.04 m, taken as millimetres since the file names no unit; --set scale="
+    assert told in capsys.readouterr().err
+    assert main([*words, "--set", "scale=0.0254", "--quiet", "--out", "inches"]) == 0
+    assert "names no unit" not in capsys.readouterr().err
+    guess, inches = (load(name).summary["bodies"]["part"]["mass"] for name in ("guess", "inches"))
+    assert inches == pytest.approx(25.4**3 * guess, rel=1e-6)

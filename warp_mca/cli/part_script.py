@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import argparse
 import json
+import logging
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from warp_mca.base.errors import RequestError, bad_value
+from warp_mca.base.log import LOGGER, warn
 from warp_mca.geometry.keyword_file import KEYWORD_SUFFIXES
 
 MESH_SUFFIXES = (".msh", ".unv", ".bdf", ".nas", ".fem", ".inp", ".k", ".key", ".dyn", ".vtu", ".vtk", ".med")
 SHOWN = 12  # node sets, solids and pairs of them that the script lists
+_UNIT = {1.0: "metres", 1e-3: "millimetres"}
+_OTHER = {1.0: "1e-3 for millimetres", 1e-3: "1 for metres"}
 OPTIONS = ("height", "pose", "onto")  # of the command line, which are parameters of the script
 EVERY = "all"  # value of --pose for a sweep over all poses
 
@@ -43,11 +48,12 @@ def build(
     return mca.drop_test(parts, height=height, pose=pose, onto=onto, mu=mu, struck=struck)
 '''
 _ACROSS = '    across: Annotated[float, mca.Param("elements over a wall", "-", low=0.25, high=64.0)] = 1.0,\n'
-_BODY = """    part = {part}  # {unit}
+_SCALE = '    scale: Annotated[float, mca.Param("metres for one unit of the file", "m", low=1e-12)] = {scale!r},\n'
+_BODY = """    part = {part}  # {size}
     kinematics = "finite" if chosen.finite_only else "corotational"
     parts = mca.Body(name="part", geometry=part, material=chosen, kinematics=kinematics)"""
-_ASSEMBLY = """    # in {unit}; materials={{"NAME": ..., "*": ...}} by solid, join={{("NAME", "NAME"): "glue"}} by pair
-    parts = mca.Assembly({path}, across=across, scale={scale:g}, materials={{"*": chosen}}, mu=mu)"""
+_ASSEMBLY = """    # {size}; materials={{"NAME": ..., "*": ...}} by solid, join={{("NAME", "NAME"): "glue"}} by pair
+    parts = mca.Assembly({path}, across=across{scale}, materials={{"*": chosen}}, mu=mu)"""
 
 
 def is_part(name: str) -> bool:
@@ -57,7 +63,21 @@ def is_part(name: str) -> bool:
     return Path(name).suffix.lower() in (*UNITS, *MESH_SUFFIXES)
 
 
-def part_script(name: str) -> str:
+class PartScript(NamedTuple):
+    """A scene file that drops a part.
+
+    Attributes:
+        text: of the scene file.
+        size: sentence on the size of the part, and on the unit in which its file counts.
+        unit_named: whether the file names that unit; else it is a guess.
+    """
+
+    text: str
+    size: str
+    unit_named: bool
+
+
+def part_script(name: str) -> PartScript:
     """A scene file that drops the part in the file `name` on a floor; the file is read for its size and its names.
 
     Raises:
@@ -71,35 +91,58 @@ def part_script(name: str) -> str:
 
     path = Path(name).resolve()
     suffix = path.suffix.lower()
-    scale, solids, touching = UNITS.get(suffix, 1.0), [], []
+    unit, solids, touching = UNITS.get(suffix, 1.0), [], []
     if suffix not in UNITS:
-        diagonal = math.hypot(*np.ptp(MeshFile(path).build().points, axis=0))
+        sides = np.ptp(MeshFile(path).build().points, axis=0)
     elif suffix == ".stl":
-        diagonal = extent(path)
+        sides = extent(path)
     else:
-        solids, touching = inspected(path, scale, file_stamp(path))
-        low, high = np.min([solid.low for solid in solids], axis=0), np.max([solid.high for solid in solids], axis=0)
-        diagonal = math.dist(low, high)
-    if scale == 1.0 and diagonal > LONGEST:  # the file names no unit
-        scale = 1e-3
-        solids, touching = inspected(path, scale, file_stamp(path)) if solids else ([], [])
-    unit, shown, more = "millimetres" if scale == 1e-3 else "metres", json.dumps(str(path)), ""
+        solids, touching = inspected(path, unit, file_stamp(path))
+        sides = np.max([solid.high for solid in solids], axis=0) - np.min([solid.low for solid in solids], axis=0)
+    named = unit != 1.0  # by the file
+    if not named and math.hypot(*sides) > LONGEST:
+        unit, sides = 1e-3, 1e-3 * sides
+        solids, touching = inspected(path, unit, file_stamp(path)) if solids else ([], [])
+    size = f"{' x '.join(f'{side:.3g}' for side in sides)} m"
+    size += ", by the unit that the file names" if named else f", taken as {_UNIT[unit]} since the file names no unit"
+    shown, more = json.dumps(str(path)), "" if suffix not in UNITS else _ACROSS
+    more, scale = (more, "") if named else (more + _SCALE.format(scale=unit), ", scale=scale")
     if len(solids) > 1:
         rows = [f"{solid.name} ({1e6 * solid.volume:.4g} cm^3)" for solid in solids]
         listing = [*_listed("Solids, bodies of these names:", rows)]
         listing += _listed("Those that touch, press on each other unless they are joined:", [t.text for t in touching])
-        parts, more = _ASSEMBLY.format(path=shown, scale=scale, unit=unit), _ACROSS
+        parts = _ASSEMBLY.format(path=shown, scale=scale, size=size)
     else:
         if suffix in UNITS:
-            mesh, more = Cad(path, across=1.0, scale=scale).build(), _ACROSS
-            code = f"mca.Cad({shown}, across=across, scale={scale:g})"
+            mesh = Cad(path, across=1.0, scale=unit).build()
+            code = f"mca.Cad({shown}, across=across{scale})"
         else:
-            mesh, code = MeshFile(path, scale=scale).build(), f"mca.MeshFile({shown}, scale={scale:g})"
+            mesh, code = MeshFile(path, scale=unit).build(), f"mca.MeshFile({shown}{scale})"
         centres = {key: mesh.points[nodes].mean(axis=0) for key, nodes in mesh.node_sets.items() if len(nodes)}
         rows = [f"{key} ({x:.4g}, {y:.4g}, {z:.4g})" for key, (x, y, z) in centres.items()]
         title = "Node sets, with their centres [m]; mca.Surface, mca.Fixed and others name them, mca.Select makes more:"
-        listing, parts = _listed(title, rows), _BODY.format(part=code, unit=unit)
-    return _SCRIPT.format(name=_plain(path.name), listing="\n".join(listing), parts=parts, more=more)
+        listing, parts = _listed(title, rows), _BODY.format(part=code, size=size)
+    text = _SCRIPT.format(name=_plain(path.name), listing="\n".join(listing), parts=parts, more=more)
+    remedy = "" if named else f"; --set scale={_OTHER[unit]}, scale=0.0254 for inches"
+    return PartScript(text, f"{_plain(path.name)} is {size}{remedy}", named)
+
+
+def script_of_drop(name: str, given: Container[str]) -> str:
+    """The scene file of a part that is dropped at once; logs its size, as a warning where the unit is a guess.
+
+    Args:
+        name: of the file.
+        given: names of the parameters that the command sets.
+
+    Raises:
+        RequestError: the file cannot be read.
+    """
+    script = part_script(name)
+    if script.unit_named:
+        logging.getLogger(LOGGER).info("%s", script.size)
+    elif "scale" not in given:
+        warn([script.size])
+    return script.text
 
 
 def _listed(title: str, rows: Sequence[str]) -> list[str]:
@@ -158,10 +201,12 @@ def print_script(name: str) -> None:
     Raises:
         RequestError: the file cannot be read.
     """
-    print(part_script(name), end="")
+    made = part_script(name)
+    print(made.text, end="")
     script = f"{Path(name).stem}_drop.py"
     deck = Path(name).suffix.lower() in KEYWORD_SUFFIXES
     print(
+        f"{made.size}\n"
         f"{Path(name).name} is a part, not a scene: the script on standard output drops it on a floor; save it with "
         f"'warp-mca run {name} > {script}', then run it with 'warp-mca run {script}'"
         + ("; --units t-mm-s, or others, runs the deck's own materials, speeds and contacts" if deck else ""),

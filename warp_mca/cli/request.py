@@ -63,7 +63,9 @@ def read_requests(args: argparse.Namespace, settings: Sequence[Mapping[str, str]
     for name in args.imports:
         import_named("--import", name)
     if drop:
-        source = catalogue.source_of_text(part_script.part_script(args.scene), f"{Path(args.scene).stem}-drop")
+        given = {name for more in settings for name in _overrides(args, more)}
+        text = part_script.script_of_drop(args.scene, given)
+        source = catalogue.source_of_text(text, f"{Path(args.scene).stem}-drop")
         return [_of_source(args, source, more) for more in settings]
     if units is not None:
         return [_of_deck(args, units, more) for more in settings]

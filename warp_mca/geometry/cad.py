@@ -7,9 +7,13 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from warp_mca.base import validate
+from warp_mca.base.arrays import Array
 from warp_mca.base.errors import RequestError, bad_value
-from warp_mca.geometry.cad_cells import read_cells
+from warp_mca.base.log import warn
+from warp_mca.geometry.cad_cells import mend_slivers, read_cells
 from warp_mca.geometry.cad_drawing import UNITS, diagonal, draw, explained, file_stamp, reading_time
 from warp_mca.geometry.cad_finer import Finer, set_finer
 from warp_mca.geometry.cad_solids import chosen_solids, glued
@@ -28,6 +32,7 @@ _ALGORITHMS = ((10.0, 6.0), (1.0, 6.0), (10.0, 1.0), (1.0, 5.0))
 _FEWER = (0.5, 0.25)  # shares of the cells over a wall that are tried where all algorithms fail
 _MESH, _ELEMENT = 60.0, 1e-4  # time that gmsh may take to mesh any part, and for an element, many times its need [s]
 _FINER = 100  # times the cells of a mesh that finer places may add, for that time
+_DENSE, _MANY = 8.0, 1e6  # cells in the cube of their size; so many are told of before gmsh makes them
 _KEPT = 32  # meshes that stay in memory, so that a body that is placed on a plane is not meshed twice
 
 
@@ -114,8 +119,8 @@ class Cad:
         return replace(mesh, notes=(*mesh.notes, *self.notes)) if self.notes else mesh
 
 
-def extent(path: str | Path, scale: float | None = None) -> float:
-    """Diagonal of the box around the part in a CAD file [m]; `scale` as in `Cad`.
+def extent(path: str | Path, scale: float | None = None) -> Array:
+    """Sides of the box around the part in a CAD file [m], shape (3,), float64; `scale` as in `Cad`.
 
     Raises:
         RequestError: there is no such file, gmsh cannot read it, or it has no solid.
@@ -125,7 +130,8 @@ def extent(path: str | Path, scale: float | None = None) -> float:
         raise bad_value("Cad.path", str(path), "there is no such file; check the path")
     with gmsh_session(reading_time(path)) as gmsh, explained(str(path)):
         draw(gmsh, str(path))
-        return diagonal(gmsh) * (part.scale or UNITS[Path(path).suffix.lower()])
+        box = np.array(gmsh.model.getBoundingBox(-1, -1)).reshape(2, 3)
+        return (box[1] - box[0]) * (part.scale or UNITS[Path(path).suffix.lower()])
 
 
 @lru_cache(maxsize=_KEPT)
@@ -174,11 +180,12 @@ def _meshed_by(cad: Cad, algorithms: dict[str, float]) -> Mesh:
             exact = divided(solid_volumes(gmsh, path), list(names.values()), whole)
         try:
             if coarse is None:
-                allow(gmsh, _MESH + reading_time(path) + _ELEMENT * _sized(gmsh, cad, scale))
+                allow(gmsh, _MESH + reading_time(path) + _ELEMENT * _sized(gmsh, cad, scale, exact))
             else:
                 set_finer(gmsh, cad.finer, coarse, scale)
                 allow(gmsh, _MESH + reading_time(path) + _ELEMENT * _FINER * coarse.cell_count)
             gmsh.model.mesh.generate(3)
+            mend_slivers(gmsh.model.mesh)
             gmsh.option.setNumber("Mesh.SecondOrderLinear", float(Path(path).suffix.lower() == ".stl"))
             gmsh.model.mesh.setOrder(2)
             if not all(len(gmsh.model.mesh.getElementTypes(*solid)) for solid in gmsh.model.getEntities(3)):
@@ -191,8 +198,11 @@ def _meshed_by(cad: Cad, algorithms: dict[str, float]) -> Mesh:
         return replace(mesh, notes=coarse.notes if coarse else (*mesh.notes, *notes))
 
 
-def _sized(gmsh: Any, cad: Cad, scale: float) -> float:
+def _sized(gmsh: Any, cad: Cad, scale: float, exact: Array) -> float:
     """Set the sizes of cells; the number of cells at most, of a part that fills its box.
+
+    Args:
+        exact: volumes of the solids in the file's unit, or none, see `solid_volumes`.
 
     Raises:
         RequestError: it is beyond all memory.
@@ -200,6 +210,10 @@ def _sized(gmsh: Any, cad: Cad, scale: float) -> float:
     if cad.size is None:
         allow(gmsh, _MESH + reading_time(cad.path))
         size = scale * set_sizes(gmsh, cad.across, drawn=Path(cad.path).suffix.lower() != ".stl")
+        if (likely := _DENSE * float(exact.sum()) * (scale / size) ** 3) > _MANY:
+            name = Path(cad.path).name
+            told = f"{name} gets some {1e-6 * likely:.2g} million cells, {size:.2g} m wide as its thinnest wall demands"
+            warn([f"{told}: give a size or a lower across if that takes too long"])
     else:
         size = cad.size
         for name in ("Mesh.MeshSizeMax", "Mesh.MeshSizeMin"):  # without a least size gmsh divides the part in ten

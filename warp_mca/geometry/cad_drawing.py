@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from warp_mca.base.errors import bad_value
 
 # Metres for one unit of the coordinates that gmsh gives: of STEP and IGES files, which name their unit, it gives mm.
 UNITS = {".step": 1e-3, ".stp": 1e-3, ".iges": 1e-3, ".igs": 1e-3, ".brep": 1.0, ".stl": 1.0}
+_HEADER, _FACET = 80, 50  # length of the header of a binary STL file, and of a triangle in it [byte]
 _TRIANGLE = 2  # number of the linear triangle in gmsh
 _SHARP = math.radians(40.0)  # angle between triangles of an STL file from which an edge parts two faces
 _BLUNT = math.radians(120.0)  # the same for surfaces whose faces gmsh cannot flatten otherwise
@@ -60,7 +62,7 @@ def draw(gmsh: Any, path: str) -> tuple[str, ...]:
     Returns:
         Sentences on what is drawn otherwise than the file has it.
     """
-    gmsh.merge(path)
+    merge(gmsh, path)
     notes: tuple[str, ...] = ()
     if Path(path).suffix.lower() == ".stl":
         _check_closed(gmsh, path)
@@ -78,6 +80,21 @@ def draw(gmsh: Any, path: str) -> tuple[str, ...]:
     if loose := sum(not len(gmsh.model.getAdjacencies(2, face)[0]) for _, face in gmsh.model.getEntities(2)):
         notes += (f"faces of {Path(path).name} that bound no solid are left out: {loose}",)
     return notes
+
+
+def merge(gmsh: Any, path: str) -> None:
+    """Read a file into gmsh's model: a binary STL file with another header, since gmsh fails at zeros and "solid"."""
+    with Path(path).open("rb") as file:
+        start = file.read(_HEADER + 4)
+        count = int.from_bytes(start[_HEADER:], "little")
+        binary = Path(path).suffix.lower() == ".stl" and Path(path).stat().st_size == _HEADER + 4 + _FACET * count
+        if not binary:
+            gmsh.merge(path)
+            return
+        with TemporaryDirectory() as folder:
+            copy = Path(folder) / "binary.stl"
+            copy.write_bytes(b"binary".ljust(_HEADER) + start[_HEADER:] + file.read())
+            gmsh.merge(str(copy))
 
 
 def _check_closed(gmsh: Any, path: str) -> None:
@@ -134,7 +151,7 @@ def _part_faces(gmsh: Any, path: str) -> float:
                 raise
             gmsh.model.remove()
             gmsh.model.add("warp_mca")
-            gmsh.merge(path)
+            merge(gmsh, path)
     raise AssertionError  # the last way has returned or raised
 
 

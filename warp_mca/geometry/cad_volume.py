@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.base.arrays import Array
+from warp_mca.geometry.cad_drawing import merge
 
 _TRIANGLE = 2  # number of the linear triangle in gmsh
 
@@ -22,7 +23,7 @@ def solid_volumes(gmsh: Any, path: str) -> Array:
     before = gmsh.model.getCurrent()
     gmsh.model.add("warp_mca_stl")  # the drawn model no longer has the file's own triangles
     try:
-        gmsh.merge(path)
+        merge(gmsh, path)
         triangles = gmsh.model.mesh.getElementsByType(_TRIANGLE)[1].reshape(-1, 3)
         tags, coordinates, _ = gmsh.model.mesh.getNodes()
     finally:

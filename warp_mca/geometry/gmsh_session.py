@@ -24,7 +24,10 @@ from typing import Any
 from warp_mca.base import validate
 from warp_mca.base.errors import RequestError, bad_value
 
-LIMIT = "WARP_MCA_MESH_TIME"  # environment variable: longest time for reading a file, and for meshing it [s]
+# Environment variable: most processor time for reading a file, and for meshing it [s]. Time by the clock would refuse
+# on a busy machine what works on a free one.
+LIMIT = "WARP_MCA_MESH_TIME"
+_IDLE = 20.0  # times that limit by the clock, for a process that waits for ever
 DEFAULT_LIMIT = 600.0  # for a file whose size the caller does not tell [s]
 DYING = 5.0  # time that a process which answers no more takes to end, at most [s]
 TOO_LONG = "it took more than"  # so begins what is said of a process that was ended for its time
@@ -42,7 +45,8 @@ def gmsh_session(allowed: float = DEFAULT_LIMIT, /, **more: float) -> Iterator[A
     They raise Exception, as gmsh does, also where gmsh crashes or takes too long. The process ends with the session.
 
     Args:
-        allowed: time for all calls, unless the environment variable `LIMIT` gives another one or `allow` more [s].
+        allowed: processor time for all calls [s], unless the environment variable `LIMIT` gives another one or `allow`
+            more.
         more: gmsh's options by name, with "__" for the dot, as Mesh__Algorithm3D.
 
     Raises:
@@ -62,7 +66,7 @@ def gmsh_session(allowed: float = DEFAULT_LIMIT, /, **more: float) -> Iterator[A
 
 
 def allow(gmsh: Any, allowed: float) -> None:
-    """Allow the process of a session so much time from now on [s], unless the environment gives another limit."""
+    """Allow a session's process so much processor time from now on [s], unless the environment gives another limit."""
     gmsh._process.allow(_limit(allowed))
 
 
@@ -71,7 +75,6 @@ class _Process:
 
     def __init__(self, limit: float) -> None:
         """Start it, with that limit of time [s]."""
-        self.allow(limit)
         command = [sys.executable, "-P", str(_SERVER)]
         # a session of its own: an interrupt from the keyboard is for this process alone
         self.process = subprocess.Popen(
@@ -79,6 +82,7 @@ class _Process:
         )
         self.broken = ""
         self._send(sys.path)
+        self.allow(limit)
 
     def call(self, name: str, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
         """What a function of gmsh returns.
@@ -95,10 +99,12 @@ class _Process:
                     raise TimeoutError
                 good, answer = pickle.load(self.process.stdout)
             except TimeoutError:
-                longer = f"the environment variable {LIMIT}={10.0 * self.limit:.2g} allows ten times as many"
-                self.broken = f"{TOO_LONG} {self.limit:.2g} s, as damaged files may make it; {longer}"
+                self.broken = self._too_long("")
             except (EOFError, pickle.UnpicklingError):
-                self.broken = f"it crashed, as damaged files may make it: {self._how_it_ended()}"
+                end = self._how_it_ended()
+                used_up = end == signal.SIGPROF.name
+                crash = f"it crashed, as damaged files may make it: {end}"
+                self.broken = self._too_long(" of processor time") if used_up else crash
             else:
                 if good:
                     return answer
@@ -108,8 +114,9 @@ class _Process:
         raise Exception(self.broken)  # as gmsh's own errors are
 
     def allow(self, limit: float) -> None:
-        """Let it take so long from now on [s]."""
-        self.limit, self.end_time = limit, time.monotonic() + limit
+        """Let it take so much processor time from now on [s]: the process counts it itself."""
+        self.limit, self.end_time = limit, time.monotonic() + min(_IDLE * limit, threading.TIMEOUT_MAX)
+        self._send(limit)
 
     def end(self) -> None:
         """Kill it, whatever it is doing."""
@@ -119,6 +126,11 @@ class _Process:
             assert pipe is not None
             with suppress(OSError):  # what could not be sent cannot be flushed
                 pipe.close()
+
+    def _too_long(self, kind: str) -> str:
+        longer = f"the environment variable {LIMIT}={10.0 * self.limit:.2g} allows ten times as many"
+        seconds = self.limit if kind else _IDLE * self.limit
+        return f"{TOO_LONG} {seconds:.2g} s{kind}, as damaged files may make it; {longer}"
 
     def _send(self, what: object) -> None:
         assert self.process.stdin is not None

@@ -32,11 +32,12 @@ PENALTY = 10.0
 FINEST = 4.0  # times smaller than the cells there, at most: steps are as many times more [-]
 # Cells that are so many times greater than those over the crushed depth would be are told of [-]. With across=2 they
 # were 24 times on an aluminium cylinder on its side, whose greatest force was 10 % less than with 1; 7 times on a ball
-# of ABS, with 1 % less where cells were half as large.
+# of ABS, with 1 % less where cells were half as large. On a steel cylinder on its side, 12 mm thick, they were 18 times
+# and the force 5 % below that of cells 2.5 times smaller; 8 times, and 6 % above it.
 _FAR = 10.0
 _TOLD = (
     "the fall crushes {name} about {depth:.2g} m deep, where its cells are {size:.2g} m, a quarter of those without: "
-    "its greatest force may depend on them; give struck a smaller size"
+    "its greatest force may be some 10 % off; give struck a smaller size"
 )
 _WORTH = 0.7  # of their size: cells that are not smaller are left as they are [-]
 _LEAST, _MOST = 1e-5, 0.2  # depths over the height of the parts, below which all is flat and above which none is [-]

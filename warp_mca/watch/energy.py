@@ -10,6 +10,7 @@ import numpy as np
 
 from warp_mca.base.arrays import Array
 from warp_mca.kernels.records.columns import PRESSURE, SPRING_ENERGY
+from warp_mca.physics.contact.sides import face_geometry
 from warp_mca.physics.elements import ELEMENTS
 from warp_mca.scene import Bolt, Contact, ContactAll, Settle, ThermalStrain
 from warp_mca.watch.contacts import on_edges
@@ -30,6 +31,8 @@ WAVE = (1.3, 4.0)
 CROSSINGS = 4.0  # of a body by waves, after which a drive presses it as slowly as no wave tells
 STILL = 1e-6  # share of a relative velocity along the normal up to which bodies do not approach each other
 WEIGHT = 2.0  # times the weight of all bodies: a contact at rest of no more force bears it
+_LANDED, _ALIKE = 0.95, 1e-3  # least share of the shadow of a body that lands flat, most difference of its speeds [-]
+_PLASTIC = 0.03  # of the exchanged energy: more plastic work limits the force
 WEAK = 0.7  # force of a flat contact over that of one wave below which springs that were given are softer than waves
 
 
@@ -124,7 +127,8 @@ def spring_shares(
 
     What is exchanged is kinetic energy gained or lost since the start, or energy that is not kinetic, whichever is
     greater, as for `Ledger.exchange_error`. None where there is no force, or hardly anything was exchanged. Where an
-    interference loads contacts at rest, all their springs and the bodies are in series: they lose s of its force.
+    interference loads contacts at rest, all their springs and the bodies are in series: they lose s of its force. What
+    lands flat on a plane loses what its force lacks of that of a wave.
 
     Args:
         c: scene, meshes and model.
@@ -154,7 +158,11 @@ def spring_shares(
             share = float(held[greatest] / exchanged[greatest])
             flat = contact if isinstance(contact, Contact) and k not in curved else None
             edges, loss = flat is not None and on_edges(c, k, depths), PEAK_LOSS * share
-            if flat is not None and not edges:
+            hard = energy["plastic"][greatest] <= _PLASTIC * exchanged[greatest]
+            landed = _loss_of_landing(c, k, float(force[greatest]), depths) if hard else None
+            if landed is not None:
+                loss = landed
+            elif flat is not None and not edges:
                 in_series = float(energy["contact"][greatest] / series[greatest]) if series[greatest] > 0.0 else 0.0
                 greatest_force = math.inf if pulled else float(force[greatest])
                 loss = _loss_of_flat(c, k, flat, share, in_series, greatest_force, ledger.time())
@@ -214,6 +222,32 @@ def _loss_of_flat(
     if force > WAVE[given] * wave:
         return 1.0 - math.sqrt(1.0 - min(share, 1.0))
     return PEAK_LOSS * share if given and force < WEAK * wave else 0.0
+
+
+def _loss_of_landing(c: Context, k: int, force: float, depths: Sequence[Array]) -> float | None:
+    """Relative loss of the peak of contact k, of a body that does not yield and lands on a plane with all its shadow.
+
+    At first it presses with Z v A, whatever is behind; springs that are softer than a thin wall do not come to that
+    before waves are back. None of other contacts, and where more than a wave presses.
+    """
+    own = [(item, depth) for item, depth in zip(c.model.passes, depths, strict=True) if item.contact == k]
+    contact = c.scene.contacts[k]
+    if not isinstance(contact, Contact) or len(own) != 1 or own[0][0].plane is None:
+        return None
+    (item, depth), normal, body = own[0], c.model.contact_axes[k, 0], contact.slave.body
+    speed, wave = c.model.V[c.nodes(body)] @ normal, _wave_force(c, k, contact, 0.0)
+    if (
+        math.isinf(wave)
+        or force > WAVE[False] * wave
+        or not depth.any()
+        or np.ptp(speed) > _ALIKE * np.abs(speed).max()
+    ):
+        return None
+    pressed = item.slave[depth.reshape(len(item.slave), -1).max(axis=1) > 0.0]
+    faces = item.slave_face[np.isin(item.slave_face, pressed).all(axis=1)]
+    if np.abs(face_geometry(c.model.X, faces)[1] @ normal).sum() < _LANDED * shadow(c, body, normal):
+        return None
+    return max(0.0, 1.0 - force / wave)
 
 
 def _is_pressed_slowly(c: Context, row: int) -> bool:

@@ -76,7 +76,7 @@ def high_yield_stress(c: Context, most: float) -> Iterator[Values]:
 
 @advice(
     f"{_BODY}, and the stable step is {{step:.2g}} s:",
-    "if its file counts in millimetres, give scale=1e-3",
+    "if its file counts in millimetres, give scale=1e-3, in inches scale=0.0254",
     LONGEST,
     f"m at most; {HEAVIEST:g} kg; a stable step of {LONGEST_STEP:g} s if it is longer than 1 m",
 )
