@@ -7,7 +7,7 @@ import warp as wp
 
 from warp_mca.kernels.contact.bond import HOLDS, hold_bond
 from warp_mca.kernels.contact.laws import PLAIN, Laws
-from warp_mca.kernels.contact.nearest import Master, nearest_function, on_fold
+from warp_mca.kernels.contact.nearest import Master, nearest_function
 from warp_mca.kernels.contact.pairs import Pairs, pair_factor
 from warp_mca.kernels.contact.search import STALE, TOO_DEEP, moved_too_far
 from warp_mca.kernels.contact.settle import meet_side, settle_functions
@@ -93,7 +93,6 @@ def surface_kernel(
                 if wp.static(noted):
                     recent_out[i] = recent(recent_out[i], force)
         if near.face >= 0 and holds and not bonded:
-            near = on_fold(X, u, master, s, X[i] + u[i], near)
             touch = meet_side(X, u, v, master, i, near, stiffness[s], dt, held, along)
             if wp.static(general):
                 factor = pair_factor(pairs, s, near.face)

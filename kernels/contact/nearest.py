@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.contact.projection import area_vector, interpolate, is_edge, nearest_point, project_on_face
+from warp_mca.kernels.contact.projection import area_vector, interpolate, is_edge, project_on_face
 from warp_mca.kernels.contact.spring import FAR
 from warp_mca.kernels.hardware.shared_memory import shared_functions
 
@@ -15,7 +15,6 @@ SLACK = 1e-4  # growth of the depth in a step allowed beyond the motion of the n
 ABOVE = 0.04  # a node that arrives beside a face passes by if another face is nearer than this below it
 
 _RIM = 1e-4  # fraction of half an edge by which a node may lie off a face and still count as above it
-_SAME = 1e-6  # share of a depth within which two points are one
 _BESIDE = 1e12  # a face in front that the node is beside counts as so many times farther
 _OPPOSED = -0.9  # least cosine between a node's last contact force and the normal of the face that presses it next
 
@@ -214,38 +213,6 @@ def nearest_of(
                 best.front = wp.min(best.front, gap)
         f = master.candidate[s, wp.min(c + stride, master.candidate.shape[1] - 1)]
     return best
-
-
-@wp.func
-def on_fold(
-    X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), master: Master, s: int, x: wp.vec3d, near: Nearest
-) -> Nearest:
-    """What the node of spring s meets: of the nearest face, the edge where the node lies below a fold.
-
-    Such a node lies beside both faces, and the edge between them is nearer than either. Its force points to that edge,
-    so that it turns from one normal to the other as the node moves across. A force that jumps between them makes energy
-    where the jumps are in step with the vibration of the node.
-    """
-    if near.beside:
-        at, foot = nearest_point(X, u, master.face, near.face, x, near.at)
-        depth = wp.length(foot)
-        normal = foot / depth
-        cosine = wp.dot(normal, near.normal)
-        folds = bool(False)
-        for c in range(master.count[s]):
-            f = master.candidate[s, c]
-            inside, there, away, area_normal, triangle = project_on_face(X, u, master.face, f, x)
-            other = area_normal / wp.length(area_normal)
-            if f != near.face and inside and wp.dot(away, other) < wp.float64(0.0):
-                _, its_foot = nearest_point(X, u, master.face, f, x, there)
-                shared = wp.length(its_foot - foot) < wp.float64(_SAME) * depth
-                between = wp.min(cosine, wp.dot(normal, other)) >= wp.dot(near.normal, other)
-                folds = folds or (shared and between and is_beside(there, triangle, wp.float64(_RIM)))
-        if folds:
-            near.at = at
-            near.gap = -depth
-            near.normal = normal
-    return near
 
 
 @cache

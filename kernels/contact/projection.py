@@ -183,63 +183,6 @@ def is_edge(
 
 
 @wp.func
-def share_of_edge(a: wp.vec3d, b: wp.vec3d) -> wp.float64:
-    """How far from a to b the point of this edge nearest to the origin lies, 0 to 1 [-]."""
-    return wp.clamp(wp.dot(a, a - b) / wp.length_sq(a - b), wp.float64(0.0), wp.float64(1.0))
-
-
-@wp.func
-def on_rim(at: wp.vec2d, triangle: bool, p0: wp.vec3d, p1: wp.vec3d, p2: wp.vec3d, p3: wp.vec3d) -> wp.vec2d:
-    """Natural coordinates of the point nearest to the origin on the edge beyond which `at` lies farthest.
-
-    The face has the corners p0 to p3; `at` itself where it lies on the face.
-    """
-    zero, one, two = wp.float64(0.0), wp.float64(1.0), wp.float64(2.0)
-    on = at
-    if triangle:
-        rest = one - at[0] - at[1]
-        least = wp.min(rest, wp.min(at[0], at[1]))
-        if least < zero:
-            if least == rest:
-                share = share_of_edge(p1, p2)
-                on = wp.vec2d(one - share, share)
-            elif least == at[0]:
-                on = wp.vec2d(zero, share_of_edge(p0, p2))
-            else:
-                on = wp.vec2d(share_of_edge(p0, p1), zero)
-    elif wp.max(wp.abs(at[0]), wp.abs(at[1])) > one:
-        if wp.abs(at[0]) > wp.abs(at[1]):
-            end = wp.sign(at[0])
-            share = share_of_edge(wp.where(end > zero, p1, p0), wp.where(end > zero, p2, p3))
-            on = wp.vec2d(end, two * share - one)
-        else:
-            end = wp.sign(at[1])
-            share = share_of_edge(wp.where(end > zero, p3, p0), wp.where(end > zero, p2, p1))
-            on = wp.vec2d(two * share - one, end)
-    return on
-
-
-@wp.func
-def nearest_point(
-    X: wp.array(dtype=wp.vec3d),
-    u: wp.array(dtype=wp.vec3d),
-    face: wp.array2d(dtype=wp.int32),
-    f: int,
-    x: wp.vec3d,
-    at: wp.vec2d,
-):
-    """The point of face f nearest to x, whose foot on it has the natural coordinates `at`, which may lie beyond its
-    edges: its coordinates, and the vector to it from x [m]."""
-    p0 = X[face[f, 0]] + u[face[f, 0]] - x
-    p1 = X[face[f, 1]] + u[face[f, 1]] - x
-    p2 = X[face[f, 2]] + u[face[f, 2]] - x
-    p3 = X[face[f, 3]] + u[face[f, 3]] - x
-    triangle = face[f, 2] == face[f, 3]
-    on = on_rim(at, triangle, p0, p1, p2, p3)
-    return on, interpolate(weights_at(on, triangle), p0, p1, p2, p3)
-
-
-@wp.func
 def distance_to_face(
     X: wp.array(dtype=wp.vec3d),
     u: wp.array(dtype=wp.vec3d),
@@ -247,7 +190,19 @@ def distance_to_face(
     f: int,
     x: wp.vec3d,
     at: wp.vec2d,
+    triangle: bool,
 ) -> wp.float64:
     """Distance of a point to a face, whose natural coordinates `at` of the foot may lie beyond its edges [m]."""
-    _on, foot = nearest_point(X, u, face, f, x, at)
+    one = wp.float64(1.0)
+    on = wp.vec2d(wp.clamp(at[0], -one, one), wp.clamp(at[1], -one, one))
+    if triangle:
+        on = wp.vec2d(wp.max(at[0], wp.float64(0.0)), wp.max(at[1], wp.float64(0.0)))
+        on = on / wp.max(on[0] + on[1], one)
+    foot = interpolate(
+        weights_at(on, triangle),
+        X[face[f, 0]] + u[face[f, 0]] - x,
+        X[face[f, 1]] + u[face[f, 1]] - x,
+        X[face[f, 2]] + u[face[f, 2]] - x,
+        X[face[f, 3]] + u[face[f, 3]] - x,
+    )
     return wp.length(foot)
