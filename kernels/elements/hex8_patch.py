@@ -9,7 +9,7 @@ from functools import cache, partial
 import warp as wp
 
 from warp_mca.kernels.elements.hex8_lanes import flow_function
-from warp_mca.kernels.elements.hex8_small import small_strain_function, yield_function
+from warp_mca.kernels.elements.hex8_small import elastic_function, small_strain_function
 from warp_mca.kernels.elements.hexahedron import LINE_SCALE, frame_functions
 from warp_mca.kernels.elements.patch_element import load_functions, sum_functions
 from warp_mca.kernels.elements.patch_kernel import PatchElement, list_element, patch_force_kernel
@@ -29,7 +29,7 @@ def element(precision: str, law_name: str, viscous: int = 0, ahead: bool = False
     load_points, load_displacements, _ = load_functions(precision)
     element_rotation, local_displacement = frame_functions(precision)
     element_forces = small_strain_function(precision, "", viscous, ahead, listed=plastic)
-    yields_somewhere = yield_function(precision)
+    is_elastic = elastic_function(precision, plastic)
     _, keep_forces, *_ = sum_functions(precision)
     keep_strain, keep_volume, strain_square = keep_functions(R)
     scale = LINE_SCALE**3
@@ -58,7 +58,7 @@ def element(precision: str, law_name: str, viscous: int = 0, ahead: bool = False
         keep_strain(e, strain_square(largest, G), extreme_out)
         yields = bool(False)
         if wp.static(plastic):
-            yields = yields_somewhere(largest, m, law)
+            yields = not is_elastic(largest, m, law)
             if yields:
                 yielded_out[e] = 1
         return yields

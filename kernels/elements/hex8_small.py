@@ -70,15 +70,17 @@ def stress_functions(precision: str) -> tuple[Any, Any, Any, Any]:
 
 
 @cache
-def yield_function(precision: str) -> Any:
-    """The function (greatest S : S / 2 of `small_strain_function`, material, law) -> whether a point yields."""
+def elastic_function(precision: str, plastic: bool) -> Any:
+    """The function (greatest S : S / 2 of `small_strain_function`, material, law) -> whether no point yields."""
     R, scale = scalars(precision).real, LINE_SCALE**3
 
     @wp.func
-    def yields(largest: R, m: int, law: wp.array2d(dtype=R)):
-        return R(3.0) * largest > R(scale) * R(scale) * law[m, 2] * law[m, 2]
+    def is_elastic(largest: R, m: int, law: wp.array2d(dtype=R)):
+        if wp.static(plastic):
+            return R(3.0) * largest <= R(scale) * R(scale) * law[m, 2] * law[m, 2]
+        return True
 
-    return yields
+    return is_elastic
 
 
 @cache
@@ -102,7 +104,7 @@ def small_strain_function(
     edge_to_node = node_force_function(precision)
     add_traction, symmetric_gradient, deviator, invariant = stress_functions(precision)
     viscous_pressure, scale = viscosity_function(precision, False, viscous, ahead), LINE_SCALE**3
-    yields = yield_function(precision)
+    is_elastic = elastic_function(precision, listed)
     plastic, flow_at = bool(law_name), flow_function(precision, law_name, points=8, scale=scale)
 
     @wp.func
@@ -128,9 +130,7 @@ def small_strain_function(
         Bx = mat43(R(NOTHING))  # cofactors alone, which carry the element's one pressure
         By = mat43(R(NOTHING))
         Bz = mat43(R(NOTHING))
-        volume = R(NOTHING)
-        dilatation = R(NOTHING)
-        largest = R(0.0)
+        volume, dilatation, largest = R(NOTHING), R(NOTHING), R(0.0)
         if wp.static(plastic):
             flag = yielded_out[e]
             flag_new = flag
@@ -160,10 +160,8 @@ def small_strain_function(
         if wp.static(plastic):
             if flag_new != flag:
                 yielded_out[e] = flag_new
-        kept = bool(True)
-        if wp.static(listed):
-            kept = not yields(largest, m, law)
-        q = R(scale) * viscous_pressure(e, dilatation / volume, R(scale) * volume, dt, kept, extreme_out)
+        theta, kept = dilatation / volume, is_elastic(largest, m, law)
+        q = R(scale) * viscous_pressure(e, theta, R(scale) * volume, dt, kept, extreme_out)
         pressure = K * dilatation / volume + q
         Fx = to_lines(Sx + pressure * Bx)
         Fy = to_lines(Sy + pressure * By)

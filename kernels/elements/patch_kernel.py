@@ -117,6 +117,21 @@ def listed_function(precision: str, flow: Any, lanes: int) -> Any:
 
 
 @cache
+def ahead_function(precision: str, viscous: int) -> Any:
+    """The function that begins to copy what a viscous element of the patch reads to the place of its forces."""
+    R, (copy, _) = scalars(precision).real, ahead_functions(precision, VISCOUS_READ)
+    pool, _ = shared_functions(precision)
+
+    @wp.func
+    def read_ahead(extreme: wp.array2d(dtype=R), e: int, exists: bool):
+        if wp.static(viscous):
+            if exists:
+                copy(extreme, DILATATION, e, pool())
+
+    return read_ahead
+
+
+@cache
 def patch_force_kernel(maker: Maker, precision: str, law_name: str, viscous: int = 0) -> Any:
     """Kernel: the forces of each patch on its nodes, bulk viscosity and, where there is a law, the plastic history.
 
@@ -137,7 +152,7 @@ def patch_force_kernel(maker: Maker, precision: str, law_name: str, viscous: int
     early = precision == "mixed" or not lanes
     begin_turns, copy_nodes, copy_ahead, _ = copy_functions(precision)
     clear_nowhere, _, sum_patch, _ = sum_functions(precision)
-    copy_viscosity, _ = ahead_functions(precision, VISCOUS_READ)
+    read_ahead = ahead_function(precision, viscous)
 
     # in float32, a few registers spilled cost less than a quarter of the threads
     @wp.kernel(
@@ -177,8 +192,7 @@ def patch_force_kernel(maker: Maker, precision: str, law_name: str, viscous: int
         head, corners = begin_turns(points, X, u, patches, block, stride, lane, ring, kept_points, pool)
         k = int(0)
         while element_count(head) > 0:
-            e = from_start(head[0] + lane)
-            m = material_of(corners[0], corners[1])
+            e, m = from_start(head[0] + lane), material_of(corners[0], corners[1])
             first, dt = (k & 1) * wp.static(slots), R(step_of(patches, head))
             Xl = load_points(kept_points, pool, corners, first, exponent_of(head))
             ul = load_displacements(pool, corners, first)
@@ -186,9 +200,7 @@ def patch_force_kernel(maker: Maker, precision: str, law_name: str, viscous: int
             wait_for_copies()
             copy_places(patches, head, lane, places)
             barrier()
-            if wp.static(viscous):
-                if lane < element_count(head):
-                    copy_viscosity(extreme_out, DILATATION, e, force_pool())
+            read_ahead(extreme_out, e, lane < element_count(head))
             if wp.static(early):
                 copy_nodes(X, u, kept_points, next_head, lane, wp.static(slots) - first, pool)
             if lane < element_count(head):

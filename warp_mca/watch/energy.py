@@ -32,6 +32,7 @@ CROSSINGS = 4.0  # of a body by waves, after which a drive presses it as slowly 
 STILL = 1e-6  # share of a relative velocity along the normal up to which bodies do not approach each other
 WEIGHT = 2.0  # times the weight of all bodies: a contact at rest of no more force bears it
 _LANDED, _ALIKE = 0.95, 1e-3  # least share of the shadow of a body that lands flat, most difference of its speeds [-]
+_THIN = 0.5  # greatest height of a body over the root of its shadow: taller ones widen as bars do, and press less
 _PLASTIC = 0.03  # of the exchanged energy: more plastic work limits the force
 WEAK = 0.7  # force of a flat contact over that of one wave below which springs that were given are softer than waves
 
@@ -225,7 +226,7 @@ def _loss_of_flat(
 
 
 def _loss_of_landing(c: Context, k: int, force: float, depths: Sequence[Array]) -> float | None:
-    """Relative loss of the peak of contact k, of a body that does not yield and lands on a plane with all its shadow.
+    """Relative loss of the peak of contact k, of a thin body that does not yield and lands on a plane with its shadow.
 
     At first it presses with Z v A, whatever is behind; springs that are softer than a thin wall do not come to that
     before waves are back. None of other contacts, and where more than a wave presses.
@@ -245,7 +246,9 @@ def _loss_of_landing(c: Context, k: int, force: float, depths: Sequence[Array]) 
         return None
     pressed = item.slave[depth.reshape(len(item.slave), -1).max(axis=1) > 0.0]
     faces = item.slave_face[np.isin(item.slave_face, pressed).all(axis=1)]
-    if np.abs(face_geometry(c.model.X, faces)[1] @ normal).sum() < _LANDED * shadow(c, body, normal):
+    area, height = shadow(c, body, normal), float(np.ptp(c.model.X[c.nodes(body)] @ normal))
+    landed = np.abs(face_geometry(c.model.X, faces)[1] @ normal).sum()
+    if landed < _LANDED * area or height > _THIN * math.sqrt(area):
         return None
     return max(0.0, 1.0 - force / wave)
 
