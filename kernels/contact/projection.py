@@ -183,6 +183,67 @@ def is_edge(
 
 
 @wp.func
+def coordinates_at(weight: wp.vec4d, triangle: bool) -> wp.vec2d:
+    """Natural coordinates of the point of a face with these shape functions: the inverse of `weights_at`."""
+    if triangle:
+        return wp.vec2d(weight[1], weight[2])
+    return wp.vec2d(weight[1] + weight[2] - weight[0] - weight[3], weight[2] + weight[3] - weight[0] - weight[1])
+
+
+@wp.func
+def edge_beyond(at: wp.vec2d, triangle: bool) -> int:
+    """The edge, by its first corner, beyond which a point at these natural coordinates lies farthest; -1 if none."""
+    zero, one = wp.float64(0.0), wp.float64(1.0)
+    k = int(-1)
+    if triangle:
+        rest = one - at[0] - at[1]
+        least = wp.min(rest, wp.min(at[0], at[1]))
+        if least < zero:
+            k = wp.where(least == rest, 1, wp.where(least == at[0], 2, 0))
+    elif wp.max(wp.abs(at[0]), wp.abs(at[1])) > one:
+        k = wp.where(at[1] > zero, 2, 0)
+        if wp.abs(at[0]) > wp.abs(at[1]):
+            k = wp.where(at[0] > zero, 1, 3)
+    return k
+
+
+@wp.func
+def nearest_point(
+    X: wp.array(dtype=wp.vec3d),
+    u: wp.array(dtype=wp.vec3d),
+    face: wp.array2d(dtype=wp.int32),
+    f: int,
+    x: wp.vec3d,
+    at: wp.vec2d,
+):
+    """The point of face f nearest to x, whose foot on it has the natural coordinates `at`, which may lie beyond its
+    edges: its shape functions, and the vector to it from x [m]."""
+    zero = wp.float64(0.0)
+    triangle = face[f, 2] == face[f, 3]
+    weight = weights_at(at, triangle)
+    k = edge_beyond(at, triangle)
+    if k >= 0:
+        last = k == 3 or (triangle and k == 2)
+        i, j = face[f, k], face[f, wp.where(last, 0, k + 1)]
+        a = X[i] + u[i] - x
+        along = X[j] + u[j] - x - a
+        share = wp.clamp(-wp.dot(a, along) / wp.length_sq(along), zero, wp.float64(1.0))
+        rest = wp.float64(1.0) - share
+        weight = wp.vec4d(wp.where(last, share, zero), zero, zero, wp.where(k == 3, rest, zero))
+        if k == 0:
+            weight = wp.vec4d(rest, share, zero, zero)
+        elif k == 1:
+            weight = wp.vec4d(zero, rest, share, zero)
+        elif k == 2:
+            weight = wp.vec4d(weight[0], zero, rest, wp.where(last, zero, share))
+    p0 = X[face[f, 0]] + u[face[f, 0]] - x
+    p1 = X[face[f, 1]] + u[face[f, 1]] - x
+    p2 = X[face[f, 2]] + u[face[f, 2]] - x
+    p3 = X[face[f, 3]] + u[face[f, 3]] - x
+    return weight, interpolate(weight, p0, p1, p2, p3)
+
+
+@wp.func
 def distance_to_face(
     X: wp.array(dtype=wp.vec3d),
     u: wp.array(dtype=wp.vec3d),
@@ -190,19 +251,7 @@ def distance_to_face(
     f: int,
     x: wp.vec3d,
     at: wp.vec2d,
-    triangle: bool,
 ) -> wp.float64:
     """Distance of a point to a face, whose natural coordinates `at` of the foot may lie beyond its edges [m]."""
-    one = wp.float64(1.0)
-    on = wp.vec2d(wp.clamp(at[0], -one, one), wp.clamp(at[1], -one, one))
-    if triangle:
-        on = wp.vec2d(wp.max(at[0], wp.float64(0.0)), wp.max(at[1], wp.float64(0.0)))
-        on = on / wp.max(on[0] + on[1], one)
-    foot = interpolate(
-        weights_at(on, triangle),
-        X[face[f, 0]] + u[face[f, 0]] - x,
-        X[face[f, 1]] + u[face[f, 1]] - x,
-        X[face[f, 2]] + u[face[f, 2]] - x,
-        X[face[f, 3]] + u[face[f, 3]] - x,
-    )
+    _weight, foot = nearest_point(X, u, face, f, x, at)
     return wp.length(foot)
