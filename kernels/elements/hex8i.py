@@ -15,7 +15,12 @@ from warp_mca.kernels.elements.formulation import OWN, SPLIT, Formulation, own_m
 from warp_mca.kernels.elements.hex8i_small import elastic_function, plastic_tractions_function, stress_function
 from warp_mca.kernels.elements.hexahedron import load_function, store_function
 from warp_mca.kernels.elements.internal_modes import mode_functions, place_functions
-from warp_mca.kernels.elements.patterns import corner_force_function, pattern_functions, pattern_strain_function
+from warp_mca.kernels.elements.patterns import (
+    balance_function,
+    corner_force_function,
+    pattern_functions,
+    pattern_strain_function,
+)
 from warp_mca.kernels.elements.readings import energy_kernel, stress_kernel
 from warp_mca.kernels.elements.viscosity import viscosity_function
 from warp_mca.kernels.hardware.scalars import scalars
@@ -44,7 +49,7 @@ def force_kernel(points: int, precision: str, law_name: str, finite: bool = Fals
     load_element, store_force = load_function(precision), store_function(precision)
     to_patterns, _ = pattern_functions(precision)
     shape_and_strain, corner_forces = pattern_strain_function(precision, finite), corner_force_function(precision)
-    frame = mode_functions(precision).frame
+    frame, balanced = mode_functions(precision).frame, balance_function(precision)
     keep_strain, keep_volume, strain_square = keep_functions(R)
     by_points, plastic = keeps_vectors(law_functions(law_name, precision), finite), bool(law_name)
     points_stress = hex8i_points.stress_function(precision, law_name, finite, points)
@@ -96,6 +101,8 @@ def force_kernel(points: int, precision: str, law_name: str, finite: bool = Fals
         if wp.static(viscous):
             pressure = viscous_pressure(e, dilatation_of(H), volume, dt, True, extreme_out)
             P = P + nominal(H, mat33(), mat33(), vec3(), pressure)
+        if wp.static(not finite):
+            P = balanced(P, H, q, Q, volume)
         f = corner_forces(x, b, volume, W, P, Q)
         for a in range(8):
             store_force(force_out, slot + a * count + e, f, a)

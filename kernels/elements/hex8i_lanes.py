@@ -14,7 +14,7 @@ from warp_mca.kernels.elements.hex8i_small import conjugate_function, settled_fu
 from warp_mca.kernels.elements.internal_modes import PLANE, mode_functions, place_functions
 from warp_mca.kernels.elements.patch import POINT, Patches
 from warp_mca.kernels.elements.patch_element import material_of
-from warp_mca.kernels.elements.patterns import VOLUME_SCALE, mean_functions
+from warp_mca.kernels.elements.patterns import VOLUME_SCALE, balance_function, mean_functions
 from warp_mca.kernels.elements.viscosity import kept_pressure_function
 from warp_mca.kernels.hardware.scalars import THIRD, scalars
 from warp_mca.kernels.hardware.shared_memory import ROW, row_functions, warp_barrier
@@ -174,7 +174,7 @@ def flow_function(points: int, precision: str, law_name: str, viscous: int = 0) 
         kept_function(precision),
         corner_functions(precision),
     )
-    mean_gradients, _ = mean_functions(precision)
+    (mean_gradients, _), balanced = mean_functions(precision), balance_function(precision)
     size = points // 4 * HISTORY_SIZE
     read_row, write_row = row_functions(precision, size)
     keep_strain, _, strain_square = keep_functions(R)
@@ -237,7 +237,8 @@ def flow_function(points: int, precision: str, law_name: str, viscous: int = 0) 
         if wp.static(viscous):
             pressure = pressure + kept_pressure(e, extreme_out)
         if valid:
-            store_lane_forces(x, b, volume, W, whole(mean, pressure), Q, right, lane, thread, force_out)
+            P = balanced(whole(mean, pressure), H, q, Q, volume)
+            store_lane_forces(x, b, volume, W, P, Q, right, lane, thread, force_out)
         return flows
 
     return flow

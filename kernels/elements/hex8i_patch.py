@@ -11,7 +11,7 @@ from warp_mca.kernels.elements.hex8i_small import elastic_function
 from warp_mca.kernels.elements.internal_modes import mode_functions
 from warp_mca.kernels.elements.patch_element import pattern_load_functions, sum_functions
 from warp_mca.kernels.elements.patch_kernel import PatchElement, list_element, patch_force_kernel
-from warp_mca.kernels.elements.patterns import corner_force_function, pattern_strain_function
+from warp_mca.kernels.elements.patterns import balance_function, corner_force_function, pattern_strain_function
 from warp_mca.kernels.elements.viscosity import viscosity_function
 from warp_mca.kernels.hardware.scalars import scalars
 from warp_mca.kernels.hardware.shared_memory import ROW
@@ -50,6 +50,7 @@ def element(points: int, precision: str, law_name: str, viscous: int = 0, ahead:
     plastic, flow = bool(law_name), flow_function(points, precision, law_name, viscous)
     load_patterns, load_displacement_patterns = pattern_load_functions(precision)
     shape_and_strain, corner_forces = pattern_strain_function(precision, False), corner_force_function(precision)
+    balanced = balance_function(precision)
     frame, elastic_stress = mode_functions(precision).frame, elastic_function(precision, points)
     keep, viscous_pressure = keep_function(precision), viscosity_function(precision, False, viscous or 1, ahead)
     _, keep_forces, *_ = sum_functions(precision)
@@ -93,7 +94,7 @@ def element(points: int, precision: str, law_name: str, viscous: int = 0, ahead:
             if wp.static(viscous):
                 for i in range(3):
                     P[i, i] += pressure
-            keep_forces(force_out, lane, corner_forces(x, b, volume, W, P, Q))
+            keep_forces(force_out, lane, corner_forces(x, b, volume, W, balanced(P, H, q, Q, volume), Q))
             keep_strain(e, strain_square(largest, G), extreme_out)
             if wp.static(plastic):
                 if R(3.0) * largest > law[m, 2] * law[m, 2]:

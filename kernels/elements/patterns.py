@@ -193,6 +193,43 @@ def pattern_strain_function(precision: str, finite: bool) -> Any:
 
 
 @cache
+def balance_function(precision: str) -> Any:
+    """The function (P, H, q, Q, volume) -> mean stress with the part that the variation of the frame gives [Pa].
+
+    Small strains are taken in a frame that turns with the mean deformation, so that the energy depends on the positions
+    of the nodes by that frame, too. With m = axial(P U) + sum of q x Q / volume, U = I + H, forces are the slope of the
+    energy if P has the skew part of axial vector y more, where (tr(U) I - U) y = m; m is zero where stress and stretch
+    have the same axes and strain is uniform. The rates of rotation and stretch: Hoger and Carlson (1984), On the
+    derivative of the square root of a tensor and Guo's rate theorems, J. Elasticity 14, 329-336.
+    """
+    t = scalars(precision)
+    R, vec3, mat33, mat43 = t.real, t.vec3, t.mat33, t.mat43
+    add_cross = fused(precision).add_cross
+
+    @wp.func
+    def balanced(P: mat33, H: mat33, q: mat43, Q: mat43, volume: R):
+        m = add_cross(add_cross(add_cross(wp.cross(q[0], Q[0]), q[1], Q[1]), q[2], Q[2]), q[3], Q[3])
+        m = (R(1.0) / volume) * m
+        for k in range(3):
+            m = add_cross(m, H[k], P[k])
+        s0 = vec3(R(2.0) + (H[1, 1] + H[2, 2]), -H[0, 1], -H[0, 2])
+        s1 = vec3(-H[0, 1], R(2.0) + (H[0, 0] + H[2, 2]), -H[1, 2])
+        s2 = vec3(-H[0, 2], -H[1, 2], R(2.0) + (H[0, 0] + H[1, 1]))
+        k0 = wp.cross(s1, s2)
+        k1 = wp.cross(s2, s0)
+        k2 = wp.cross(s0, s1)
+        m = (R(1.0) / wp.dot(s0, k0)) * m
+        y = vec3(wp.dot(k0, m), wp.dot(k1, m), wp.dot(k2, m))
+        return mat33(
+            P[0, 0], P[0, 1] + y[2], P[0, 2] - y[1],
+            P[1, 0] - y[2], P[1, 1], P[1, 2] + y[0],
+            P[2, 0] + y[1], P[2, 1] - y[0], P[2, 2],
+        )  # fmt: skip
+
+    return balanced
+
+
+@cache
 def corner_force_function(precision: str) -> Any:
     """The function (x, b, volume, W, P, Q) -> forces on the corners [N], out of frame W.
 
