@@ -94,7 +94,7 @@ def surface_kernel(
                 if wp.static(noted):
                     recent_out[i] = recent(recent_out[i], force)
         if near.face >= 0 and holds and not bonded:
-            near = on_fold(X, u, master, s, X[i] + u[i], near)
+            near = on_fold(X, u, master, X[i] + u[i], near)
             touch = meet_side(X, u, v, master, i, near, stiffness[s], dt, held, along)
             if wp.static(general):
                 factor = pair_factor(pairs, s, near.face)

@@ -3,78 +3,85 @@
 import warp as wp
 
 from warp_mca.kernels.contact.nearest import Master, Nearest
-from warp_mca.kernels.contact.projection import coordinates_at, nearest_point
+from warp_mca.kernels.contact.projection import edge_beyond, nearest_on_edge, place
 
-_ROUND_OFF = 1e-12  # of shape functions
-
-
-@wp.func
-def place(X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), i: int) -> wp.vec3d:
-    """Where node i is [m]."""
-    return X[i] + u[i]
+AROUND = 8  # faces around a node that are looked at
 
 
 @wp.func
-def shared_weights(face: wp.array2d(dtype=wp.int32), f: int, g: int, weight: wp.vec4d):
-    """Shape functions of face f at the point of face g where those of g are `weight`; whether f has this point."""
-    own = wp.vec4d()
-    other = wp.vec4i(face[g, 0], face[g, 1], face[g, 2], face[g, 3])
-    for b in range(4):
-        i = face[f, b]
-        for a in range(4):
-            if i == other[a]:
-                own[b] += weight[a]
-    if face[f, 2] == face[f, 3]:
-        own[3] = wp.float64(0.0)
-    return own, own[0] + own[1] + own[2] + own[3] > wp.float64(1.0) - wp.float64(_ROUND_OFF)
+def corner_of(face: wp.array2d(dtype=wp.int32), f: int, i: int) -> int:
+    """Which corner of face f is node i."""
+    return wp.where(face[f, 0] == i, 0, wp.where(face[f, 1] == i, 1, wp.where(face[f, 2] == i, 2, 3)))
 
 
 @wp.func
-def edge_normal(
+def normal_at_edge(
     X: wp.array(dtype=wp.vec3d),
     u: wp.array(dtype=wp.vec3d),
     face: wp.array2d(dtype=wp.int32),
     f: int,
-    weight: wp.vec4d,
+    c: int,
+    share: wp.float64,
+    point: wp.vec3d,
 ):
-    """Unit normal of face f at a point of its edges, where its shape functions are `weight`."""
+    """Vector along the normal of face f at a point of its edge to corner c, that share of the way back [m^2]."""
     corners = wp.where(face[f, 2] == face[f, 3], 3, 4)
-    normal = wp.vec3d()
-    for b in range(4):
-        if weight[b] > wp.float64(0.0):
-            p = place(X, u, face[f, b])
-            ahead = place(X, u, face[f, (b + 1) % corners]) - p
-            behind = place(X, u, face[f, (b + corners - 1) % corners]) - p
-            normal += weight[b] * wp.cross(ahead, behind)
-    return wp.normalize(normal)
+    ahead = place(X, u, face[f, (c + 1) % corners])
+    before = place(X, u, face[f, (c + corners - 1) % corners])
+    beyond = place(X, u, face[f, (c + corners - 2) % corners])
+    inward = (wp.float64(1.0) - share) * (ahead - point) + share * (beyond - point)
+    return wp.cross(inward, before - place(X, u, face[f, c]))
+
+
+@wp.func
+def coordinates_on_edge(k: int, share: wp.float64, triangle: bool) -> wp.vec2d:
+    """Natural coordinates of a point of the edge from corner k, that share of the way."""
+    one = wp.float64(1.0)
+    if triangle:
+        ahead = wp.where(k == 0, share, wp.where(k == 1, one - share, wp.float64(0.0)))
+        return wp.vec2d(ahead, wp.where(k == 0, wp.float64(0.0), wp.where(k == 1, share, one - share)))
+    along = wp.where(k < 2, one, -one) * (share + share - one)
+    across = wp.where(k == 1 or k == 2, one, -one)
+    return wp.where(k % 2 == 0, wp.vec2d(along, across), wp.vec2d(across, along))
 
 
 @wp.func
 def on_fold(
-    X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), master: Master, s: int, x: wp.vec3d, near: Nearest
+    X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), master: Master, x: wp.vec3d, near: Nearest
 ) -> Nearest:
-    """What the node of spring s meets: of the nearest face, the edge where the node lies below a fold.
+    """What a node at x meets: of the nearest face, the edge where the node lies below a fold.
 
     Such a node lies beside both faces, and the edge between them is nearer than either. Its force points to that edge,
     so that it turns from one normal to the other as the node moves across. A force that jumps between them makes energy
     where the jumps are in step with the vibration of the node.
     """
     if near.beside:
-        weight, foot = nearest_point(X, u, master.face, near.face, x, near.at)
-        depth = wp.length(foot)
-        normal = foot / depth
-        cosine = wp.dot(normal, near.normal)
+        f = near.face
+        triangle = master.face[f, 2] == master.face[f, 3]
+        k = edge_beyond(near.at, triangle)
+        share, foot = nearest_on_edge(X, u, master.face, f, k, x)
+        if share == wp.float64(1.0):  # the end of an edge is the start of the next
+            k = wp.where(k == 3 or (triangle and k == 2), 0, k + 1)
+            share = wp.float64(0.0)
+        i = master.face[f, k]
+        square, turned = wp.length_sq(foot), wp.dot(foot, near.normal)
+        g = int(f)
+        edge = int(k)
         folds = bool(False)
-        for c in range(master.count[s]):
-            f = master.candidate[s, c]
-            its_weight, shared = shared_weights(master.face, f, near.face, weight)
-            if shared and f != near.face:
-                other = edge_normal(X, u, master.face, f, its_weight)
-                below = wp.dot(normal, other)
-                between = wp.min(cosine, below) >= wp.dot(near.normal, other)
-                folds = folds or (below > wp.float64(0.0) and between)
+        for _ in range(
+            wp.where(share > wp.float64(0.0), 1, AROUND)
+        ):  # the face beyond the edge, or all around a corner
+            g = master.across[g, edge]
+            if folds or g < 0 or g == f:
+                break
+            edge = corner_of(master.face, g, i)
+            normal = normal_at_edge(X, u, master.face, g, edge, share, x + foot)
+            below, least = wp.dot(foot, normal), wp.dot(near.normal, normal)
+            most = wp.min(below * below, turned * turned * wp.length_sq(normal))
+            folds = below > wp.float64(0.0) and (least < wp.float64(0.0) or most >= square * least * least)
         if folds:
-            near.at = coordinates_at(weight, master.face[near.face, 2] == master.face[near.face, 3])
+            depth = wp.sqrt(square)
+            near.at = coordinates_on_edge(k, share, triangle)
             near.gap = -depth
-            near.normal = normal
+            near.normal = (wp.float64(1.0) / depth) * foot
     return near

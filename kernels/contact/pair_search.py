@@ -120,10 +120,10 @@ def clear_kernel(each: bool, sides: int) -> Any:
                     if pairs.body[f] > body:
                         following = wp.min(following, pairs.body[f])
                     if pairs.body[f] == body:
-                        inside, at, away, area_normal, _triangle = project_on_face(X, u, face, f, x)
+                        inside, at, away, area_normal, triangle = project_on_face(X, u, face, f, x)
                         gap = wp.dot(away, wp.normalize(area_normal))
                         depth = wp.abs(gap)
-                        distance = distance_to_face(X, u, face, f, x, at)
+                        distance = distance_to_face(X, u, face, f, x, at, away, triangle)
                         closer = distance < nearest
                         if wp.abs(distance - nearest) <= wp.float64(EQUAL) * nearest:
                             closer = depth > plane or (depth == plane and gap >= wp.float64(0.0))

@@ -183,14 +183,6 @@ def is_edge(
 
 
 @wp.func
-def coordinates_at(weight: wp.vec4d, triangle: bool) -> wp.vec2d:
-    """Natural coordinates of the point of a face with these shape functions: the inverse of `weights_at`."""
-    if triangle:
-        return wp.vec2d(weight[1], weight[2])
-    return wp.vec2d(weight[1] + weight[2] - weight[0] - weight[3], weight[2] + weight[3] - weight[0] - weight[1])
-
-
-@wp.func
 def edge_beyond(at: wp.vec2d, triangle: bool) -> int:
     """The edge, by its first corner, beyond which a point at these natural coordinates lies farthest; -1 if none."""
     zero, one = wp.float64(0.0), wp.float64(1.0)
@@ -208,39 +200,26 @@ def edge_beyond(at: wp.vec2d, triangle: bool) -> int:
 
 
 @wp.func
-def nearest_point(
+def place(X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), i: int) -> wp.vec3d:
+    """Where node i is [m]."""
+    return X[i] + u[i]
+
+
+@wp.func
+def nearest_on_edge(
     X: wp.array(dtype=wp.vec3d),
     u: wp.array(dtype=wp.vec3d),
     face: wp.array2d(dtype=wp.int32),
     f: int,
+    k: int,
     x: wp.vec3d,
-    at: wp.vec2d,
 ):
-    """The point of face f nearest to x, whose foot on it has the natural coordinates `at`, which may lie beyond its
-    edges: its shape functions, and the vector to it from x [m]."""
-    zero = wp.float64(0.0)
-    triangle = face[f, 2] == face[f, 3]
-    weight = weights_at(at, triangle)
-    k = edge_beyond(at, triangle)
-    if k >= 0:
-        last = k == 3 or (triangle and k == 2)
-        i, j = face[f, k], face[f, wp.where(last, 0, k + 1)]
-        a = X[i] + u[i] - x
-        along = X[j] + u[j] - x - a
-        share = wp.clamp(-wp.dot(a, along) / wp.length_sq(along), zero, wp.float64(1.0))
-        rest = wp.float64(1.0) - share
-        weight = wp.vec4d(wp.where(last, share, zero), zero, zero, wp.where(k == 3, rest, zero))
-        if k == 0:
-            weight = wp.vec4d(rest, share, zero, zero)
-        elif k == 1:
-            weight = wp.vec4d(zero, rest, share, zero)
-        elif k == 2:
-            weight = wp.vec4d(weight[0], zero, rest, wp.where(last, zero, share))
-    p0 = X[face[f, 0]] + u[face[f, 0]] - x
-    p1 = X[face[f, 1]] + u[face[f, 1]] - x
-    p2 = X[face[f, 2]] + u[face[f, 2]] - x
-    p3 = X[face[f, 3]] + u[face[f, 3]] - x
-    return weight, interpolate(weight, p0, p1, p2, p3)
+    """The point nearest to x on the edge from corner k of face f: its share of the way, and the vector to it from x."""
+    last = k == 3 or (k == 2 and face[f, 2] == face[f, 3])
+    start = place(X, u, face[f, k]) - x
+    along = place(X, u, face[f, wp.where(last, 0, k + 1)]) - x - start
+    share = wp.clamp(-wp.dot(start, along) / wp.length_sq(along), wp.float64(0.0), wp.float64(1.0))
+    return share, start + share * along
 
 
 @wp.func
@@ -251,7 +230,12 @@ def distance_to_face(
     f: int,
     x: wp.vec3d,
     at: wp.vec2d,
+    away: wp.vec3d,
+    triangle: bool,
 ) -> wp.float64:
-    """Distance of a point to a face, whose natural coordinates `at` of the foot may lie beyond its edges [m]."""
-    _weight, foot = nearest_point(X, u, face, f, x, at)
+    """Distance of x to a face [m]; `away` leads from its nearest point, which may lie beyond its edges, to x."""
+    k = edge_beyond(at, triangle)
+    if k < 0:
+        return wp.length(away)
+    _share, foot = nearest_on_edge(X, u, face, f, k, x)
     return wp.length(foot)

@@ -233,13 +233,13 @@ def clear_kernel(each: bool, sides: int) -> Any:
         clear = bool(False)
         behind = int(0)  # side of the nearest face
         while wp.bvh_query_next(query, f):
-            inside, at, away, area_normal, _triangle = project_on_face(X, u, face, f, x)
+            inside, at, away, area_normal, triangle = project_on_face(X, u, face, f, x)
             gap = wp.dot(away, wp.normalize(area_normal))
             depth = wp.abs(gap)
             distance = depth
             closer = depth < nearest or (depth == nearest and gap >= wp.float64(0.0))
             if wp.static(sides > 1):
-                distance = distance_to_face(X, u, face, f, x, at)
+                distance = distance_to_face(X, u, face, f, x, at, away, triangle)
                 closer = distance < nearest
                 if wp.abs(distance - nearest) <= wp.float64(EQUAL) * nearest:
                     closer = depth > plane or (depth == plane and gap >= wp.float64(0.0))

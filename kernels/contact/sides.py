@@ -86,7 +86,7 @@ def sided_kernel(friction: bool, each: bool, sides: int, laws: Laws = PLAIN, slo
                     near.front = front  # of every side so far
                     held, pressed = spring.held[e], spring.face[e] >= 0
                     if near.face >= 0:
-                        near = on_fold(at.X, at.u, at.master, e, x, near)
+                        near = on_fold(at.X, at.u, at.master, x, near)
                         touch = meet(v, at.master.face, i, near, dt, held, wp.vec3f(pressure(e, spring)))
                         touches = may_press(at, s, near, held, pressed, touch.du, node, fronts, front_face, recent_out)
                         if step == 0:

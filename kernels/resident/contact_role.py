@@ -65,7 +65,7 @@ def contact_role(friction: bool, laws: Laws) -> Any:
     ):
         """Press a node or release it, as `contact.surface_kernel` does."""
         if near.face >= 0:
-            near = on_fold(X, state_out.u, master, s, X[i] + state_out.u[i], near)
+            near = on_fold(X, state_out.u, master, X[i] + state_out.u[i], near)
             touch = meet_side(X, state_out.u, state_out.v, master, i, near, slaves.stiffness[s], dt, held, along)
             left = leave(s, i, X, state_out.u, state_out.v, master, touch, spring)
             state_out.nodal_force[i] = state_out.nodal_force[i] + (

@@ -86,6 +86,26 @@ def _faces_around(nodes: Index, face: Index) -> tuple[Index, Index]:
     return offset.astype(np.int32), (order // 4).astype(np.int32)
 
 
+def faces_across(face: Index) -> Index:
+    """The face beyond the edge from each corner of a face to the next, or -1, shape (face_count, 4), int32.
+
+    Args:
+        face: corners, shape (face_count, 4); a triangle has its last one twice, and none beyond its last edge.
+    """
+    triangle, ends = is_triangle(face), np.stack([face, np.roll(face, -1, axis=1)], axis=2)
+    ends[triangle, 2, 1] = face[triangle, 0]
+    ends.sort(axis=2)
+    edge = ends.reshape(-1, 2)
+    order = np.lexsort(edge.T)
+    alone = np.zeros(face.shape, dtype=bool)
+    alone[:, 3] = triangle
+    order = order[~alone.ravel()[order]]
+    same = np.flatnonzero((edge[order[1:]] == edge[order[:-1]]).all(axis=1))
+    found = np.full(face.size, -1, np.int32)
+    found[order[same]], found[order[same + 1]] = order[same + 1] // 4, order[same] // 4
+    return found.reshape(face.shape)
+
+
 def _returns(contact: Contact | ContactAll) -> bool:
     """Whether springs return the energy of closing and opening: those without a penalty."""
     plain = contact.law is None or not contact.law.damping(0.0)
