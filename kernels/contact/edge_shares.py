@@ -45,9 +45,10 @@ def carry_kernel(sides: int) -> Any:
             g = slaves.face_of_slave[j]
             for back in range(2):
                 outer = slaves.number[neighbour(slaves.face, g, i, 3 - 2 * back)]
-                for e in range(wp.static(sides) * outer, wp.static(sides) * (outer + 1)):
-                    if spring.support[e] == 2 * g + back:
-                        total += (wp.float64(1.0) - spring.share[e]) * spring.force[e]
+                if spring.rests[outer] == 1:
+                    for e in range(wp.static(sides) * outer, wp.static(sides) * (outer + 1)):
+                        if spring.support[e] == 2 * g + back:
+                            total += (wp.float64(1.0) - spring.share[e]) * spring.force[e]
         if wp.length_sq(total) > wp.float64(0.0):
             nodal_force_out[i] = nodal_force_out[i] + total
 

@@ -106,6 +106,10 @@ def sided_kernel(friction: bool, each: bool, sides: int, laws: Laws = PLAIN, slo
         if active:
             nodal_force_out[i] = nodal_force_out[i] + total
             recent_out[i] = recent(recent_out[i], total)
+            rests = int(0)
+            for e in range(start, end):
+                rests = wp.where(spring.support[e] >= 0, 1, rests)
+            spring.rests[s] = rests
         if moved_too_far(at.u[i], u_search[i], of(margin, k)):
             flag_out[k, STALE] = 1
 

@@ -34,8 +34,9 @@ class Spring:
     made: energy that it made so far, see `balance.energy_made` [J]. left: compression with which the side pressed the
     node last, until it is in front of that side, below it without being pressed, or pressed by another [m]. support,
     share: the slave's edge that the spring presses in place of its node, or -1, and the node's share of the force [-];
-    see `edge_rest`. bears: 1 where the side was the last to press the node itself, else 0 [-]. These four are only of
-    masters with several sides. dashpot: force of the law's dashpot in the last step [N], and energy that it dissipated
+    see `edge_rest`. bears: 1 where the side was the last to press the node itself, else 0 [-]. rests: 1 where a spring
+    of a slave node has a support, else 0 [-], shape (slave_count,). These five are only of masters with several sides.
+    dashpot: force of the law's dashpot in the last step [N], and energy that it dissipated
     so far [J]; only of laws that have one. limit: of the friction force in the last step [N], and friction_parameters:
     of the laws of friction [SI units], shape (law_count spring_count, parameter_count), those of spring 0 first; only
     of contacts with such laws. bond: 1 while a bond holds the node to its place on `face`, -1 once it has failed, else
@@ -67,6 +68,7 @@ class Spring:
     support: wp.array(dtype=wp.int32)
     share: wp.array(dtype=wp.float64)
     bears: wp.array(dtype=wp.int32)
+    rests: wp.array(dtype=wp.int32)
     dashpot: wp.array(dtype=wp.vec2d)
     limit: wp.array(dtype=wp.float64)
     friction_parameters: wp.array2d(dtype=wp.float64)

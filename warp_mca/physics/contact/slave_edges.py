@@ -41,6 +41,7 @@ def new_springs(count: int, sided: int, stage: ContactStage) -> Any:
     found.share = wp.full(sided, 1.0, dtype=wp.float64)
     found.support = wp.full(sided, -1, dtype=wp.int32)
     found.bears = wp.zeros(sided, dtype=wp.int32)
+    found.rests = wp.zeros(len(stage.slave) if sided else 0, dtype=wp.int32)
     found.held = wp.full(count, spring.ANY_DEPTH, dtype=wp.float64)
     found.face = wp.full(count, -1, dtype=wp.int32)
     found.weight = wp.zeros(count, dtype=wp.vec4d)
