@@ -133,10 +133,10 @@ class ContactStage:
         self._place(model)
         counts = ([len(getattr(item, name)) for item in self.items] for name in ("face", "master"))
         self.face_scene, self.master_scene = (per_scene(offsets(count)) for count in counts)
-        faces = self._join("face")
-        self.face, self.across = (wp.array(rows, dtype=wp.int32) for rows in (faces, faces_across(faces)))
+        faces, side = self._join("face"), self._join("side")
+        self.face, self.across = (wp.array(rows, dtype=wp.int32) for rows in (faces, faces_across(faces, side)))
         self.face_stiffness = wp.array(self._join("face_stiffness"), dtype=wp.float64)
-        self.side = wp.array(self._join("side"), dtype=wp.int32) if self.sides > 1 else 0
+        self.side = wp.array(side, dtype=wp.int32) if self.sides > 1 else 0
         self.master = wp.array(self._join("master"), dtype=wp.int32)
         self.face_offset, self.face_of_node = self._rows("face", "face_offset", "face_of_node")
         self.pairs, self.edges = device_pairs([item.pairs for item in self.items]), None
