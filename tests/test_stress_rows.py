@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from warp_mca.phases.stress_rows import StressRows, take_all
+from warp_mca.phases.stress_rows import StressRows
 from warp_mca.system.records import SceneRecords
 
 
@@ -26,14 +26,3 @@ def test_rows_are_every_so_many_records_of_the_scenes_own_probes(monkeypatch: py
         kept.path_stress, kept.records, kept.count = rows.first(count), end, count
     cut = np.concatenate(rows.first(count - 3))  # where a guard stops the scene
     np.testing.assert_array_equal(cut, expected[: count - 3])
-
-
-@pytest.mark.parametrize("threads", [1, 3, 16])
-def test_threads_give_each_scene_its_own_probes(threads: int):
-    records = np.random.default_rng(0).normal(size=(32, 10, 6)).astype(np.float32)
-    rows = [StressRows(SceneRecords(), 1, slice(2 * k, 2 * k + 2)) for k in range(5)]
-    for written in (32, 7):
-        take_all(rows, written, records, threads)
-    for k, own in enumerate(rows):
-        expected = np.concatenate([records, records[:7]])[:, 2 * k : 2 * k + 2]
-        np.testing.assert_array_equal(np.concatenate(own.first(39)), expected)

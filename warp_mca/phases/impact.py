@@ -23,7 +23,6 @@ from warp_mca.phases.exposed import Exposed
 from warp_mca.phases.impact_loop import Loop
 from warp_mca.phases.initial_overlap import settle_initial_overlap
 from warp_mca.phases.scene_run import SceneRun
-from warp_mca.phases.stress_rows import take_all
 from warp_mca.physics.floating.frames import with_floating_frames
 from warp_mca.step.output import Output
 from warp_mca.step.sensor_stage import SensorStage
@@ -117,7 +116,7 @@ class Impact:
         self.recording: Recording | None = None
         self._room: dict[str, NDArray] = {}  # for the records of SETS sets, used again and again
         self._held, self._sets = 0, 1  # one set at first, so that scenes that break at once end the run at once
-        self.span, self._threads = span, threads
+        self.span = span
         self._watches = [
             Watch(k.scene, k.meshes, k.model, self.solver.dt, span, k.skins, k.home.nodes if k.home else None)
             for k in ready
@@ -230,8 +229,9 @@ class Impact:
             GuardError: a guard stops the last one.
         """
         if "path_stress" in records:
-            going = [item.stress for k, item in enumerate(self.scene_runs) if self.stopped[k] is None]
-            take_all(going, written, records["path_stress"], self._threads)
+            for k, scene_run in enumerate(self.scene_runs):
+                if self.stopped[k] is None:
+                    scene_run.stress.take(written, records["path_stress"])
         if len(self.scene_runs) == 1:
             return self._hand_over(written, records)
         raised = bool(records["flag"][:, :-1].any())

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 from numpy.typing import NDArray
 
 from warp_mca.system.records import SceneRecords
 
-MOST = 8  # threads that copy: more wait for the same memory
 BLOCK = 1024  # rows for which memory is reserved at a time, so that those of most runs need not be joined
 
 
@@ -41,18 +37,3 @@ class StressRows:
         """The first `count` rows, as `SceneRecords.path_stress`: no copies."""
         left = count - sum(map(len, self._before))
         return [*self._before, *(block[: max(left - BLOCK * k, 0)] for k, block in enumerate(self._blocks))]
-
-
-def take_all(rows: Sequence[StressRows], written: int, stress: NDArray[np.float32], threads: int) -> None:
-    """`StressRows.take` of many scenes by some threads: the first touch of their memory takes most of the time."""
-    count = max(1, min(threads, MOST, len(rows)))
-
-    def take(first: int) -> None:
-        for own in rows[first::count]:
-            own.take(written, stress)
-
-    if count < 2:
-        take(0)
-        return
-    with ThreadPoolExecutor(count) as pool:
-        list(pool.map(take, range(count)))
