@@ -15,6 +15,8 @@ from impacts import begun, finished, prepared, result_of
 import warp_mca as mca
 from warp_mca.base.errors import RequestError
 from warp_mca.phases.division import divide
+from warp_mca.phases.settings import settings_of
+from warp_mca.step import device
 
 ALUMINIUM = {"E": 70e9, "nu": 0.0, "rho": 2700.0}
 C = np.sqrt(70e9 / 2700.0)
@@ -309,3 +311,19 @@ def test_runs_of_two_threads_wait_for_each_other():
         first, second = pool.map(one, range(2))
     assert sum(a != b for a, b in pairwise(order)) == 1
     assert np.array_equal(first.F_n, second.F_n)
+
+
+def test_cuda_stands_for_all_gpus_of_a_sweep_and_for_the_first_elsewhere(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(device, "all_devices", lambda: ["cpu", "cuda:0", "cuda:1"])
+    assert device.devices_named("cuda") == ["cuda:0", "cuda:1"]
+    assert device.devices_named("cuda:1") == ["cuda:1"]
+    assert settings_of("cuda", "mixed", 1).device == "cuda:0"
+    monkeypatch.setattr(device, "all_devices", lambda: ["cpu"])
+    with pytest.raises(RequestError, match=r"device = 'cuda'.*this machine has cpu"):
+        settings_of("cuda", "mixed", 1)
+
+
+@pytest.mark.gpu
+def test_a_run_takes_the_device_that_a_sweep_takes():
+    one, other = (mca.run(bar(duration=2e-6), device=name).summary for name in ("cuda", "cuda:0"))
+    assert one["device"] == other["device"]

@@ -19,12 +19,13 @@ from sweeping import SCENE, TIMED, Losing, figures, lose_device
 
 import warp_mca as mca
 from warp_mca.cli.main import main
+from warp_mca.step.device import devices_named
 from warp_mca.studies.sweep import TRIES
 from warp_mca.studies.sweep_job import BETWEEN, NO_FIGURES, Job, check_device_after
 from warp_mca.studies.sweep_job import figures as summary_figures
 from warp_mca.studies.sweep_lines import read_lines
 from warp_mca.studies.sweep_plan import FULL, Plan, RunOptions, batches, differing
-from warp_mca.studies.sweep_workers import Workers, devices_named, early_worker
+from warp_mca.studies.sweep_workers import Workers, early_worker
 from warp_mca.studies.worker_process import DeviceLost, WorkerDied
 
 pytestmark = pytest.mark.usefixtures("no_figures")

@@ -67,7 +67,7 @@ def run(
 
     Args:
         scene: what to run.
-        device: "cpu" or a CUDA device as "cuda:0".
+        device: "cpu", a CUDA device as "cuda:0", or "cuda" for the first of them.
         precision: "mixed" computes elements in float32 around float64 nodes, "float64" all in float64.
         threads: CPU threads to use; None for all cores that this process may use. Results do not depend on it.
         multi_rate: groups of elements with steps of their own; "auto" chooses how many, None: all take one step.

@@ -11,12 +11,13 @@ import select
 import subprocess
 import sys
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 T = TypeVar("T")
+Busy = dict["Helper", deque["int | None"]]  # numbers of the jobs of each helper, None for its begin
 _PROGRAM = Path(__file__).with_name("helper.py")
 ROOM = 1 << 20  # of a pipe [byte]
 _OWN = ("warp_mca.", "numpy.", "builtins.", "pathlib.")  # where classes are that a helper knows
@@ -177,23 +178,23 @@ class Helpers:
     ) -> dict[int, T]:
         self.begin(count)
         left, answers = deque(range(jobs)), {}
-        busy: dict[Helper, int | None] = {helper: None for helper in self._all if not helper.begun}
+        busy: Busy = {helper: deque[int | None]([None]) for helper in self._all if not helper.begun}
         for helper in [helper for helper in self._all if helper.begun]:
             self._next(helper, message, left, busy)
-        while left or any(k is not None for k in busy.values()):
+        while left or any(k is not None for asked in busy.values() for k in asked):
             begun = any(helper.begun for helper in busy)
             for helper in select.select(list(busy), [], [], None if begun else 0.0)[0]:
-                k = busy.pop(helper)
+                k = busy[helper].popleft()
                 try:
                     found = helper.answer()
                     helper.begun = True
                     if k is not None and found[0]:
                         answers[k], self.by[k] = found[1], helper
                         told(k, found[1])
-                    self._next(helper, message, left, busy)
                 except LostError:
-                    self._lose(helper)
-                    left.extend(() if k is None else (k,))
+                    self._lose(helper, [k, *busy.pop(helper)], left)
+                else:
+                    self._next(helper, message, left, busy)
             if left and not any(helper.begun for helper in busy):
                 k = left.popleft()
                 with suppress(Exception):  # raised at the end, if it is the first
@@ -212,23 +213,25 @@ class Helpers:
             while len(self._all) < count:
                 self._all.append(Helper(self._modules))
 
-    def _next(
-        self, helper: Helper, message: Callable[[int], bytes], left: deque[int], busy: dict[Helper, int | None]
-    ) -> None:
-        if not left:
-            return
-        k = left.popleft()
+    def _next(self, helper: Helper, message: Callable[[int], bytes], left: deque[int], busy: Busy) -> None:
+        """Ask for jobs: one, or two while all helpers get more, so that none waits for this process to read answers."""
+        asked = busy.pop(helper, deque())
         try:
-            helper.send(message(k))
+            while left and len(asked) < (2 if len(left) > len(self._all) else 1):
+                asked.append(left.popleft())
+                helper.send(message(cast("int", asked[-1])))
         except LostError:
-            self._lose(helper)
-            left.append(k)
+            self._lose(helper, asked, left)
         else:
-            busy[helper] = k
+            if asked:
+                busy[helper] = asked
 
-    def _lose(self, helper: Helper) -> None:
+    def _lose(self, helper: Helper, asked: Iterable[int | None] = (), left: deque[int] | None = None) -> None:
+        """End a helper; others do what it was asked."""
         helper.end()
         self._all.remove(helper)
+        if left is not None:
+            left.extend(k for k in asked if k is not None)
 
 
 def message(function: Callable[..., Any], data: bytes) -> bytes:

@@ -16,6 +16,7 @@ from warp_mca.phases.every import METHODS
 from warp_mca.physics.elements import ELEMENTS
 from warp_mca.results.figure_style import FIGURES
 
+DEVICE = "cpu, or a CUDA device as cuda:0; cuda: a sweep takes all, all else the first (default: %(default)s)"
 WELCOME = """\
 warp_mca computes the impact of flexible machines: rigid links swing until they touch something, then explicit
 elastoplastic finite elements with frictional contact take over.
@@ -167,7 +168,7 @@ def _sweep(parser: argparse.ArgumentParser) -> None:
 def _tradeoff(parser: argparse.ArgumentParser) -> None:
     _add_scene(parser)
     parser.add_argument("--budget", type=float, metavar="SECONDS", help="time for all runs (default: all variants)")
-    parser.add_argument("--device", default="cpu", help="cpu or a CUDA device as cuda:0 (default: %(default)s)")
+    parser.add_argument("--device", default="cpu", help=DEVICE)
     parser.add_argument("--threads", type=int, metavar="N", help="CPU threads to use (default: all cores)")
     parser.add_argument(
         "--duration", type=float, metavar="SECONDS", help="length of the impact phase (default: the scene's)"
@@ -236,7 +237,7 @@ def _add_import(parser: argparse.ArgumentParser | argparse._ArgumentGroup) -> No
 
 def _add_device(parser: argparse.ArgumentParser) -> None:
     group = _group(parser, "device", "… --device cuda:0 --precision float64")
-    group.add_argument("--device", default="cpu", help="cpu or a CUDA device as cuda:0 (default: %(default)s)")
+    group.add_argument("--device", default="cpu", help=DEVICE)
     group.add_argument("--precision", default="mixed", choices=("mixed", "float64"), help="(default: %(default)s)")
 
 

@@ -25,8 +25,8 @@ _NEAR, _FAR = 0.5 + 0.5 / np.sqrt(3.0), 0.5 - 0.5 / np.sqrt(3.0)  # weights of t
 
 def interpolated(value: Array, axis: int) -> Array:
     """Values at the two Gauss points of an axis from those at its ends; the map is symmetric."""
-    found = np.empty_like(value)
-    (low, high), (first, second) = np.moveaxis(value, axis, 0), np.moveaxis(found, axis, 0)
+    found, before = np.empty_like(value), (slice(None),) * axis
+    low, high, first, second = (array[*before, k] for array in (value, found) for k in (0, 1))
     np.multiply(low, _NEAR, out=first)
     np.multiply(high, _NEAR, out=second)
     first += _FAR * high
@@ -49,7 +49,7 @@ def tangents(x: Array) -> list[Array]:
     corner = np.ascontiguousarray(x.transpose(2, 1, 0)[:, GRID]).reshape(3, 2, 2, 2, len(x))
     found = []
     for axis in (3, 2, 1):
-        low, high = np.moveaxis(corner, axis, 0)
+        low, high = (corner[*((slice(None),) * axis), k] for k in (0, 1))
         slope = interpolated(interpolated(0.5 * (high - low), 1), 2)
         found.append(np.expand_dims(slope, axis))
     return found

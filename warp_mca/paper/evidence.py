@@ -13,10 +13,10 @@ from warp_mca.paper.studies import MAIN, STUDIES, Case, Key, Level, cases, in_or
 from warp_mca.phases.arguments import Progress
 from warp_mca.results.result import Result
 from warp_mca.results.storage import load
+from warp_mca.step.device import devices_named
 from warp_mca.studies.sweep import carry_out, stored_rows
 from warp_mca.studies.sweep_job import DONE, Row
 from warp_mca.studies.sweep_plan import Plan, RunOptions, differing, run_name
-from warp_mca.studies.sweep_workers import devices_named
 from warp_mca.studies.worker_process import Prepare
 
 RUNS = "runs"  # folder of the sweep

@@ -25,8 +25,8 @@ from warp_mca.paper.table_2 import compare, stored
 from warp_mca.phases.arguments import Progress
 from warp_mca.phases.every import METHOD
 from warp_mca.results.storage import folder_path, load
+from warp_mca.step.device import check_device
 from warp_mca.studies.sweep_job import DONE, Row
-from warp_mca.studies.sweep_workers import devices_named
 from warp_mca.studies.worker_process import Prepare
 
 HTML, JSON, MARKDOWN = "paper.html", "paper.json", "paper.md"
@@ -92,7 +92,7 @@ def make_report(
     if pure_fem and runs.comparison is None and time.monotonic() < end:
         if not runs.pure.exists():
             _report(runs, precision)  # the run of finite elements alone may be interrupted, again and again
-        options["device"] = devices_named(device)[0]
+        options["device"] = check_device(device)
         runs = replace(runs, comparison=compare(pure_case(level).scene(), runs.pure, **options))
     return _report(runs, precision)
 

@@ -114,8 +114,8 @@ class Impact:
         self.exposed = Exposed(self.ready[0], self.solver, self.state) if model.fails and len(ready) == 1 else None
         self.stopped: list[str | None] = [None] * len(self.ready)
         self.recording: Recording | None = None
-        self._held: list[dict[str, NDArray]] = []
-        self._sets = 1  # so that scenes that break at once end the run at once
+        self._room: dict[str, NDArray] = {}  # for the records of SETS sets, used again and again
+        self._held, self._sets = 0, 1  # one set at first, so that scenes that break at once end the run at once
         self.span = span
         self._watches = [
             Watch(k.scene, k.meshes, k.model, self.solver.dt, span, k.skins, k.home.nodes if k.home else None)
@@ -237,18 +237,22 @@ class Impact:
         raised = bool(records["flag"][:, :-1].any())
         if raised:
             self.read_rest()
-        names = records.keys() - {"path_stress"}
-        self._held.append({name: records[name][: None if name == "flag" else written].copy() for name in names})
-        if raised or len(self._held) >= self._sets:
+        held, self._room["flag"] = self._held, records["flag"].copy()
+        for name in records.keys() - {"path_stress", "flag"}:
+            array = records[name]
+            if name not in self._room:
+                self._room[name] = np.empty((SETS * len(array), *array.shape[1:]), dtype=array.dtype)
+            self._room[name][held : held + written] = array[:written]
+        self._held += written
+        if raised or self._held + len(records["partial"]) > self._sets * len(records["partial"]):
             self._sets = min(self._sets + 1, SETS)
             self.read_rest()
 
     def read_rest(self) -> None:
         """Hand over what is held of a batch; raises as `read`."""
-        held, self._held = self._held, []
+        held, self._held = self._held, 0
         if held:
-            joined = {name: np.concatenate([item[name] for item in held]) for name in held[0].keys() - {"flag"}}
-            self._hand_over(len(joined["partial"]), joined | {"flag": held[-1]["flag"]})
+            self._hand_over(held, {name: a if name == "flag" else a[:held] for name, a in self._room.items()})
 
     def _hand_over(self, written: int, records: Mapping[str, NDArray]) -> None:
         for k, scene_run in enumerate(self.scene_runs):

@@ -204,19 +204,19 @@ def _deep_in(
         found = _found(near + first, depth, np.zeros(len(near)), DEEP * _edge(stage, scene))
     if found:
         return found
-    node, middle, radius = _cells_behind(ready.meshes[slave.body], slave.nodes, X[model.node_start[slave.body] :])
-    near = np.flatnonzero(_in_box(middle, body))
-    if not len(near):
+    node, middle, radius = _cells_behind(ready.meshes[slave.body], slave.nodes, X[model.node_start[slave.body] :], body)
+    if not len(node):
         return None
-    depth = depths_below(middle[near], body, triangulated(mesh.boundary[0]))
-    depth[depth <= WITHIN * radius[near]] = 0.0
-    nodes = node[near] + model.node_start[slave.body] + first
+    depth = depths_below(middle, body, triangulated(mesh.boundary[0]))
+    depth[depth <= WITHIN * radius] = 0.0
+    nodes = node + model.node_start[slave.body] + first
     within = _found(nodes, depth, np.zeros(len(near)), 0.0)
     return replace(within, count=int((depth > 0.0).sum()), kind="cells") if within else None
 
 
-def _cells_behind(mesh: Mesh, name: str, X: Array) -> tuple[NDArray[np.int32], Array, Array]:
-    """A corner, the middle [m] and the distance from it to the nearest corner [m] of the cells behind a surface.
+def _cells_behind(mesh: Mesh, name: str, X: Array, body: Array) -> tuple[NDArray[np.int32], Array, Array]:
+    """A corner, the middle [m] and the distance from it to the nearest corner [m] of the cells behind a surface whose
+    middles lie in the box around a body.
 
     Where two equal bodies coincide no node is inside, but these middles are.
     """
@@ -225,6 +225,8 @@ def _cells_behind(mesh: Mesh, name: str, X: Array) -> tuple[NDArray[np.int32], A
         part = conn[behind[(behind >= first) & (behind < first + len(conn))] - first]
         first += len(conn)
         middle = X[part].mean(axis=1)
+        near = _in_box(middle, body)
+        part, middle = part[near], middle[near]
         radius = np.linalg.norm(X[part] - middle[:, None], axis=2).min(axis=1, initial=np.inf)
         found.append((part[:, 0], middle, radius))
     corner, middle, radius = (np.concatenate(arrays) for arrays in zip(*found, strict=True))

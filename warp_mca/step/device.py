@@ -15,16 +15,30 @@ def all_devices() -> list[str]:
     return [str(device) for device in wp.get_devices()]
 
 
-def check_device(name: str, known: Sequence[str] | None = None) -> str:
-    """The name of a device that this machine has, of those that are `known` if another process has found them.
+def devices_named(name: str, known: Sequence[str] | None = None) -> list[str]:
+    """The devices of that name: "cuda" stands for all GPUs.
+
+    Args:
+        name: as a user gives it.
+        known: those of this machine, if another process has found them; None: this one starts the driver.
 
     Raises:
-        RequestError: there is no such device.
+        RequestError: there is none.
     """
     known = known or all_devices()
-    if name not in known:
+    found = [device for device in known if device == name or (name == "cuda" and device.startswith("cuda:"))]
+    if not found:
         raise bad_value("device", name, f"this machine has {', '.join(known)}")
-    return name
+    return found
+
+
+def check_device(name: str) -> str:
+    """The device of that name for work that takes one, the first of `devices_named`.
+
+    Raises:
+        RequestError: there is none.
+    """
+    return devices_named(name)[0]
 
 
 def answers(name: str) -> bool:

@@ -20,6 +20,7 @@ from warp_mca.phases.rate_groups import check_multi_rate
 from warp_mca.results.storage import check_output, folder_path
 from warp_mca.scene import Scene
 from warp_mca.scene.options import with_options
+from warp_mca.step.device import devices_named
 from warp_mca.studies.sweep_columns import parameter_column
 from warp_mca.studies.sweep_job import Job, Row, failure, job_of, run_job
 from warp_mca.studies.sweep_plan import Plan, RunOptions, batches, differing
@@ -28,7 +29,6 @@ from warp_mca.studies.sweep_table import IDENTITY, SweepTable, check_identity, r
 from warp_mca.studies.sweep_workers import (
     check_executor,
     connected,
-    devices_named,
     early_worker,
     lost_worker,
     opened_executor,

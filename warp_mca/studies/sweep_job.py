@@ -85,12 +85,11 @@ def job_of(plan: Plan, group: Sequence[int], count: int) -> Job:
     options = plan.options
     if options.threads is None:
         options = replace(options, threads=max(1, thread_count(None) // count) if count else 1)
-    device = "cuda:0" if options.device == "cuda" else options.device
     return Job(
         tuple(group),
         tuple(plan.scenes[k] for k in group),
         tuple(plan.run_folder(k) for k in group),
-        replace(options, device=device),
+        options,
         plan.model,
     )
 

@@ -96,6 +96,7 @@ def _prepare(prepare: Prepare | None, options: RunOptions, workers: int | None, 
     They begin before the driver does, where it is known how many workers share the cores.
     """
     from warp_mca.phases.by_helpers import begin_for
+    from warp_mca.step.device import devices_named
 
     cores, share = thread_count(None), workers or (1 if options.device != "cuda" else 0)
     if share:
@@ -180,19 +181,3 @@ def worker_count(options: RunOptions, workers: int | None, devices: Sequence[str
     """The number of workers: as asked for, or one for each GPU, or as many as the cores have threads for."""
     usual = len(devices) if devices != ["cpu"] else max(1, thread_count(None) // (options.threads or 1))
     return workers or usual
-
-
-def devices_named(name: str, known: Sequence[str] | None = None) -> list[str]:
-    """The devices of that name: "cuda" stands for all GPUs.
-
-    Args:
-        name: as `RunOptions.device`.
-        known: those of this machine, if another process has found them; None: this one starts the driver.
-
-    Raises:
-        RequestError: there is none.
-    """
-    from warp_mca.step.device import all_devices, check_device
-
-    found = name == "cuda" and [device for device in known or all_devices() if device.startswith("cuda")]
-    return found or [check_device(name, known)]

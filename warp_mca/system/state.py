@@ -11,7 +11,7 @@ import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -76,7 +76,7 @@ class State:
 
     def copy(self) -> State:
         """A copy on the same device."""
-        found = _copied(self)
+        found = _copied(replace(self, scenes=[]))
         found.scenes = [records.copy() for records in self.scenes]
         return found
 

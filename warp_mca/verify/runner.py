@@ -57,7 +57,7 @@ def verify(
         GuardError: a case was not met.
     """
     chosen = cases(names)
-    check_device(device)
+    device = check_device(device)
     if out is not None:
         check_folder("out", out)
     outcomes = []

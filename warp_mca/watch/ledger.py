@@ -70,6 +70,7 @@ class Ledger:
         """
         self.model, self.steps, self.tolerance, self.precision = model, steps, tolerance, precision
         self.kept, self.framed = kept, framed
+        self._table: tuple[tuple[int, int], Array] = (0, 0), np.zeros((0, self._width))
         if not len(kept.peaks):
             kept.peaks = np.zeros((len(model.passes), 2))
         self.spin = _spin(model)
@@ -269,8 +270,15 @@ class Ledger:
         return self._energies(self.table(first))
 
     def table(self, first: int = 0) -> Array:
-        """Columns of each row of the history from row `first` on, shape (row_count, column_count), float64."""
-        return np.array(self.kept.sums[first:]).reshape(-1, self._width)
+        """Columns of each row of the history from row `first` on, shape (row_count, column_count), float64.
+
+        It is made once for all who read the same rows, which never change.
+        """
+        asked = first, len(self.kept.sums)
+        if self._table[0] != asked:
+            self._table = asked, np.array(self.kept.sums[first:]).reshape(-1, self._width)
+            self._table[1].flags.writeable = False
+        return self._table[1]
 
 
 def _spin(model: Model) -> float:

@@ -10,6 +10,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warp_mca.base.arrays import Array, Index
+from warp_mca.base.kept import Kept
 from warp_mca.base.rotation import best_rotation
 from warp_mca.geometry.cell_types import triangulated
 from warp_mca.kernels.contact import crossing
@@ -23,6 +24,7 @@ THIN = 0.05  # quantile of distances through a body that counts as its thickness
 SAMPLES = 2048  # points of a skin that are looked for in another body, evenly spread, where edges lie in it
 RAYS = 2048  # through a body and away from it, evenly spread over its triangles
 SHAPE_NODES = 1024  # of a body that tell how far it is out of shape, evenly spread
+_KEPT: Kept[tuple[Index, Index, Index]] = Kept(500_000)  # triangles of skins of this process, 25 MB of memory
 NOWHERE: Found = (0.0, np.full(3, np.nan))
 
 
@@ -74,6 +76,18 @@ class _EdgeSearch:
         return self._depth[: len(edge)], self._at[: len(edge)]
 
 
+def _parts(faces: Index) -> tuple[Index, Index, Index]:
+    """Nodes of faces, and triangles and edges of these by position in them, as `Skin` has them; found once."""
+    if (kept := _KEPT.get(key := faces.tobytes())) is None:
+        own = np.unique(faces)
+        triangle = np.searchsorted(own, triangulated(faces)).astype(np.int32)
+        ends = np.sort(triangle[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).astype(np.int64)
+        code = np.unique(ends[:, 0] * len(own) + ends[:, 1])
+        kept = own, triangle, np.stack([code // len(own), code % len(own)], axis=1).astype(np.int32)
+        _KEPT.put(key, kept, len(triangle))
+    return kept
+
+
 class Skin:
     """The closed surface of a body, which moves; computed on the host's CPU.
 
@@ -92,12 +106,8 @@ class Skin:
 
     def __init__(self, name: str, faces: Index, X: Array, start: int) -> None:
         """Take the faces of a mesh whose nodes begin at `start` in positions X [m], shape (node_count, 3), float64."""
-        self.name, own = name, np.unique(faces)
+        self.name, (own, self.triangle, self.edge) = name, _parts(faces)
         self.nodes = (own + start).astype(np.int32)
-        self.triangle = np.searchsorted(own, triangulated(faces)).astype(np.int32)
-        ends = np.sort(self.triangle[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).astype(np.int64)
-        code = np.unique(ends[:, 0] * len(own) + ends[:, 1])
-        self.edge = np.stack([code // len(own), code % len(own)], axis=1).astype(np.int32)
         self.X = X[self.nodes]
         length = np.linalg.norm(self.X[self.edge[:, 0]] - self.X[self.edge[:, 1]], axis=1)
         self.longest = float(length.max())

@@ -270,7 +270,11 @@ def gather_lists(stages: Sequence[ElementStage], node_count: int) -> tuple[Index
 
 def list_slots(entry: Index, node: Index, node_count: int) -> tuple[Index, Index]:
     """As `gather_lists`, of some slots: entries that stand for them, and the node of each; -1 where a node has none."""
-    slot, count = entry[np.argsort(node, kind="stable")], np.bincount(node, minlength=node_count)
+    from scipy.sparse import csc_array
+
+    count, begins = np.bincount(node, minlength=node_count), np.arange(len(node) + 1, dtype=np.int32)
+    by_slot = csc_array((np.empty(len(node), np.int8), node, begins), shape=(node_count, len(node)))
+    slot = entry[by_slot.tocsr().indices]  # a stable sort by node, in a tenth of the time of argsort
     begin = np.cumsum(count) - count
     first_slots = np.full((node_count, 2), -1, dtype=np.int32)
     first_slots[count > 0, 0] = slot[begin[count > 0]]
