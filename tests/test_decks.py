@@ -258,13 +258,15 @@ def test_all_keywords_that_are_not_read_are_listed(tmp_path: Path):
     own, empty = ("CONTROL_HOURGLASS", "CONTROL_ACCURACY", "CONTROL_SOLID"), "DAMPING_GLOBAL"
     more = "".join(f"*{name}\n{card('columns', [1])}" for name in (*silent, *own, "FROBNICATE")) + f"*{empty}\n"
     (tmp_path / "it.k").write_text(deck("columns", more))
-    words = mca.read_deck(tmp_path / "it.k", "t-mm-s", ["FROB*"]).bodies[0].geometry.notes
+    mesh = mca.read_deck(tmp_path / "it.k", "t-mm-s", ["FROB*"]).bodies[0].geometry
+    assert isinstance(mesh, mca.Mesh)
+    words = mesh.notes
     for why, names in (
         ("left out, which changes no result", ("DATABASE_GLSTAT", *silent)),
         ("are left to the elements of this program", own),
         ("is left out, without cards", (empty,)),
         ("is left out, as asked", ("FROBNICATE",)),
     ):
-        (note,) = (words for words in words if words.endswith(why))
+        (note,) = (note for note in words if note.endswith(why))
         assert [name.split(" ")[0] for name in note.split("*")[1:]] == list(names)
     assert not any(word in note for word in ("TITLE", "KEYWORD") for note in words)
