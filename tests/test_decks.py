@@ -251,3 +251,22 @@ def test_keywords_are_left_out_when_asked(tmp_path: Path):
     assert isinstance(found.bodies[0].geometry, mca.Mesh)
     words = " ".join(found.bodies[0].geometry.notes)
     assert "*HOURGLASS (line" in words and "*DAMPING_GLOBAL (line" in words
+
+
+def test_all_keywords_that_are_not_read_are_listed(tmp_path: Path):
+    silent = ("DATABASE_BINARY_D3PLOT", "CONTROL_ENERGY", "CONTROL_OUTPUT", "CONTROL_SHELL", "SENSOR_DEFINE_NODE")
+    own, empty = ("CONTROL_HOURGLASS", "CONTROL_ACCURACY", "CONTROL_SOLID"), "DAMPING_GLOBAL"
+    more = "".join(f"*{name}\n{card('columns', [1])}" for name in (*silent, *own, "FROBNICATE")) + f"*{empty}\n"
+    (tmp_path / "it.k").write_text(deck("columns", more))
+    mesh = mca.read_deck(tmp_path / "it.k", "t-mm-s", ["FROB*"]).bodies[0].geometry
+    assert isinstance(mesh, mca.Mesh)
+    words = mesh.notes
+    for why, names in (
+        ("left out, which changes no result", ("DATABASE_GLSTAT", *silent)),
+        ("are left to the elements of this program", own),
+        ("is left out, without cards", (empty,)),
+        ("is left out, as asked", ("FROBNICATE",)),
+    ):
+        (note,) = (note for note in words if note.endswith(why))
+        assert [name.split(" ")[0] for name in note.split("*")[1:]] == list(names)
+    assert not any(word in note for word in ("TITLE", "KEYWORD") for note in words)

@@ -25,7 +25,7 @@ EDGE, CORNER = "xmin-zmin", "xmin-ymin-zmin"
 
 @pytest.fixture(scope="module")
 def block(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A STEP file of a block, and beside it round.step, which has round edges."""
+    """A STEP file of a block, and beside it round.step, which has round edges, cylinder.step and ball.step."""
     import gmsh
 
     folder = tmp_path_factory.mktemp("block")
@@ -39,6 +39,11 @@ def block(tmp_path_factory: pytest.TempPathFactory) -> Path:
             if radius:
                 shapes.fillet([solid], [edge for _, edge in gmsh.model.getEntities(1)], [radius])
                 shapes.synchronize()
+            gmsh.write(str(folder / f"{name}.step"))
+            gmsh.clear()
+        for name in ("cylinder", "ball"):
+            shapes.addCylinder(0, 0, 0, 0, 0, 10, 6) if name == "cylinder" else shapes.addSphere(0, 0, 0, 6)
+            shapes.synchronize()
             gmsh.write(str(folder / f"{name}.step"))
             gmsh.clear()
     finally:
@@ -135,6 +140,21 @@ def test_what_is_crushed_far_less_than_a_cell_is_told(block: Path, stress: float
     assert len(notes) == told
     if told:
         assert f"about {depth:.2g} m deep" in notes[0] and "give struck a smaller size" in notes[0]
+
+
+@pytest.mark.parametrize(("name", "told"), [("cylinder", True), ("ball", False)])
+def test_the_depth_that_is_told_is_that_of_round_sides(block: Path, name: str, told: bool):
+    """Coarse cells make a corner of a round side, which is crushed deeper. A cylinder is crushed over its length L by
+    d: sigma L (4 / 3) d sqrt(2 R d) = m g h; its finer cells are still 26 times as wide."""
+    steel = mca.J2Bilinear(E=210e9, nu=0.3, rho=7850.0, sigma_y=250e6, E_t=1e9)
+    body = dropped(block.with_name(f"{name}.step"), "xmin", material=steel if told else ABS, across=1.0)
+    notes = [note for note in mesh_of(body).notes if "the fall crushes block" in note]
+    assert len(notes) == told
+    if told:
+        energy, R = math.pi * 0.006**2 * 7850.0 * 9.81 * HEIGHT, 0.006  # per length
+        depth = (energy / 250e6 * 0.75 / math.sqrt(2.0 * R)) ** (2.0 / 3.0)
+        said = float(notes[0].split("about ")[1].split(" m")[0])
+        assert 0.8 * depth < said < 1.5 * depth
 
 
 def test_other_words_are_refused(block: Path):

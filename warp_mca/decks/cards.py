@@ -12,6 +12,10 @@ from warp_mca.geometry.deck import real
 from warp_mca.geometry.keyword_file import MeshReader
 from warp_mca.geometry.keyword_text import EIGHT, Keyword, keywords, whole
 
+# Why keywords are not read, behind their names.
+OWN, HARMLESS = "left to the elements of this program", "left out, which changes no result"
+EMPTY, ASKED = "left out, without cards", "left out, as asked"
+
 
 @dataclass(frozen=True)
 class Card:
@@ -86,30 +90,27 @@ class Content:
         self.found: dict[str, list[Keyword]] = {key: [] for key in rules.READ}
         self.notes: list[str] = []
         unknown: dict[str, str] = {}
-        own: dict[str, str] = {}
-        left: dict[str, str] = {}
+        unread: dict[str, dict[str, str]] = {why: {} for why in (OWN, HARMLESS, EMPTY, ASKED)}
         for item in keywords(path):
             kind = rules.kind(item.name)
             if rules.is_in(item.name, leave_out):
-                left.setdefault(item.name, item.place)
+                unread[ASKED].setdefault(item.name, item.place)
             elif kind == "mesh":
                 try:
                     self.mesh.take_mesh(item)
                 except ValueError as error:
                     raise ValueError(self.mesh.at(error)) from error
-            elif kind is None and (rules.is_in(item.name, rules.BARE) or any(line.strip() for _, line in item.lines)):
-                unknown.setdefault(item.name, item.place)
-            elif kind == "numerics":
-                own.setdefault(item.name, item.place)
+            elif kind is None:
+                bare = not rules.is_in(item.name, rules.BARE) and not any(line.strip() for _, line in item.lines)
+                (unread[EMPTY] if bare else unknown).setdefault(item.name, item.place)
+            elif kind in ("numerics", "harmless"):
+                unread[OWN if kind == "numerics" else HARMLESS].setdefault(item.name, item.place)
             elif kind:
                 self.found[kind].append(item)
         if unknown:
             remedy = "write the deck without, or name them in leave_out (--leave-out)"
             raise ValueError(f"{_listed(unknown)} not read; {remedy}")
-        if own:
-            self.notes.append(f"{path}: {_listed(own)} left to the elements of this program")
-        if left:
-            self.notes.append(f"{path}: {_listed(left)} left out, as asked")
+        self.notes += [f"{path}: {_listed(places)} {why}" for why, places in unread.items() if places]
 
     def card(self, item: Keyword, index: int, names: str, widths: Sequence[int] = EIGHT) -> Card:
         """A card of a keyword, counted from 0 behind its title; one that is missing is blank."""

@@ -39,8 +39,8 @@ FLATTEST = 0.05  # share of the stable step below which the estimate does not go
 def read_deck(path: str | Path, units: str, leave_out: Sequence[str] = ()) -> Scene:
     """A scene from an LS-DYNA keyword deck and the files that it includes, in SI units.
 
-    A keyword that is not understood is refused with its line, unless it is known to change no result, as *DATABASE_...
-    What is taken otherwise than LS-DYNA does is said in a warning, which the run keeps. What is read:
+    A keyword that is not understood is refused with its line, unless it is known to change no result, as *DATABASE_...;
+    these are listed. What is taken otherwise than LS-DYNA does is said in a warning, which the run keeps. What is read:
 
     - *PART, *SECTION_SOLID: a body, one for parts that share nodes, with finite strain. ELFORM 1 is hex8r, 2 hex8,
       -1, -2 and 18 hex8i; tetrahedra are tet4 or tet10, wedges wedge6 where the element allows.

@@ -44,9 +44,10 @@ READ: dict[str, tuple[str, ...]] = {
         )
     ),
 }
-# Requests of output, words, checks, what belongs to elements that are refused, sets that nothing read names.
+WORDS = ("", "KEYWORD*", "TITLE", "COMMENT*")  # that no reader of a deck misses
+# Requests of output, checks, what belongs to elements that are refused, sets that nothing read names.
 HARMLESS = (
-    *("", "KEYWORD*", "TITLE", "COMMENT*", "DATABASE_*", "CONTROL_OUTPUT", "CONTROL_ENERGY", "CONTROL_SHELL"),
+    *("DATABASE_*", "CONTROL_OUTPUT", "CONTROL_ENERGY", "CONTROL_SHELL"),
     *("CONTROL_CPU", "CONTROL_PARALLEL", "CONTROL_MPP_*", "CONTROL_CHECK*", "CONTROL_STRUCTURED*", "CONTROL_UNITS"),
     *("CONTACT_FORCE_TRANSDUCER*", "SET_SHELL*", "SET_BEAM*", "SET_SOLID*", "SET_DISCRETE*", "DEFINE_BOX_ADAPTIVE"),
     *("SECTION_SHELL*", "SECTION_BEAM*", "SECTION_DISCRETE*", "SENSOR_*", "TERMINATION_NODE*"),
@@ -58,11 +59,11 @@ BARE = ("CASE_*", "CASE")
 
 
 def kind(name: str) -> str | None:
-    """Key in READ, "" for what changes nothing, "numerics", or None for what is not understood."""
-    found = next((key for key, names in READ.items() if name in names), None)
-    if found is None and is_in(name, HARMLESS):
-        return ""
-    return "numerics" if found is None and is_in(name, NUMERICS) else found
+    """Key in READ, "" for words, "harmless" for what changes no result, "numerics", or None if it is not understood."""
+    if found := next((key for key, names in READ.items() if name in names), None):
+        return found
+    kinds = {"": WORDS, "harmless": HARMLESS, "numerics": NUMERICS}
+    return next((key for key, patterns in kinds.items() if is_in(name, patterns)), None)
 
 
 def is_in(name: str, patterns: Iterable[str]) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import time
 from typing import TYPE_CHECKING
 
 import warp as wp
@@ -15,15 +16,18 @@ if TYPE_CHECKING:
     from warp_mca.phases.impact import Impact
     from warp_mca.system.model import Model
 
-SPEED_UP = 0.65  # power of the number of threads with which elements go faster; measured on up to 16
-DOUBLE = {"cpu": 1.6, "cuda": 1.7}  # time of an element in float64 over that in mixed
-ELEMENTS = {"hex8r": 0.7, "tet4": 0.6, "wedge6": 0.7}  # time of an element over that of hex8
+DOUBLE = 1.7  # time of an element on a GPU in float64 over that in mixed
+ELEMENTS = {"hex8r": 0.7, "tet4": 0.6, "wedge6": 0.7}  # time of an element there over that of hex8
+TRIED, STRIDE, ENOUGH = 32, 4, 0.05  # steps of a CPU that are timed at most, at once; time after which fewer do [s]
+SETTLING = 1000  # steps for which the time of bodies that come to rest is said: how many they need is not known before
 SPRINGS = 0.05  # share of the greatest eigenvalue from which on contact springs are said to set the step too
 
 
 def announce(impact: Impact) -> None:
     """Say by the logger what is about to run, at level INFO."""
-    logging.getLogger(LOGGER).info("%s", forecast(impact))
+    logger = logging.getLogger(LOGGER)
+    if logger.isEnabledFor(logging.INFO):  # the estimate takes steps
+        logger.info("%s", forecast(impact))
 
 
 def forecast(impact: Impact) -> str:
@@ -36,9 +40,12 @@ def forecast(impact: Impact) -> str:
     rates = model.rates
     groups = f" (of {rates.top + 1} groups; the shortest {steps.dt / rates.substeps:.3g} s)" if rates else ""
     where = device.name if device.is_cuda else f"cpu, {solver.threads} thread{'s' if solver.threads > 1 else ''}"
+    step = step_time(impact)
+    each = f", after bodies have come to rest ({duration_words(SETTLING * step)} for each {SETTLING:,} steps)"
     return (
-        f"{name}: {model.element_count:,} elements, {steps.count:,} steps of {steps.dt:.3g} s{groups}, "
-        f"set by {_culprit(slowest)}; about {duration_words(expected_time(impact))} on {where}"
+        f"{name}: {model.element_count:,} elements, {steps.count:,} steps of {steps.dt:.3g} s{groups}, set by "
+        f"{_culprit(slowest)}; about {duration_words(steps.count * step)} on {where}"
+        f"{each if impact.ready[0].scene.phases else ''}"
     )
 
 
@@ -53,15 +60,33 @@ def _culprit(model: Model) -> str:
     return f"element {element} of {name}{springs}"
 
 
-def expected_time(impact: Impact) -> float:
-    """About how long the steps take [s], by the costs that `runs.rate_groups` stores for devices of this kind."""
+def step_time(impact: Impact) -> float:
+    """About how long a step takes [s], with its share of searches and records.
+
+    A CPU takes a few steps of a copy of the state. For a GPU the costs that `rate_groups` stores are taken: it holds no
+    other state, and contact there mostly runs beside the elements.
+    """
+    if not wp.get_device(impact.solver.device).is_cuda:
+        return _tried(impact)
     solver, steps, rates = impact.solver, impact.steps, impact.solver.model.rates
-    cuda = wp.get_device(solver.device).is_cuda
-    cost = cost_of(solver.device)
     weight = [ELEMENTS.get(block.element, 1.0) * block.conn.shape[1] for block in solver.model.blocks]
     share = sum(weight) / max(solver.model.element_count, 1)
-    share *= DOUBLE["cuda" if cuda else "cpu"] if solver.precision == "float64" else 1.0
-    share /= solver.threads**SPEED_UP
+    share *= DOUBLE if solver.precision == "float64" else 1.0
     work = rates.work if rates else solver.model.element_count
     count = steps.count * (rates.substeps if rates else 1)
-    return cost.of(count, round(share * work * steps.count), rates is not None)
+    return cost_of(solver.device).of(count, round(share * work * steps.count), rates is not None) / steps.count
+
+
+def _tried(impact: Impact) -> float:
+    """The time of a step by a few steps of a copy of the state, a search and a record, which costs about as much."""
+    solver, steps, state = impact.solver, impact.steps, impact.state.copy()
+    begin = time.perf_counter()
+    solver.search(state)
+    search = time.perf_counter() - begin
+    solver.step(state, STRIDE)  # captures the graph
+    begin, taken = time.perf_counter(), 0
+    while taken < TRIED and time.perf_counter() < begin + ENOUGH:
+        solver.step(state, STRIDE)
+        taken += STRIDE
+    step = (time.perf_counter() - begin) / taken
+    return step * (1.0 + 1.0 / steps.per_check) + search / (steps.per_search * steps.intervals_per_search)

@@ -19,7 +19,7 @@ from warp_mca.base.arrays import Array
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.geometry.cad_finer import Finer
 from warp_mca.scene.bodies import Body
-from warp_mca.scene.extent import cell_values, in_place
+from warp_mca.scene.extent import cell_values, in_place, mesh_of
 
 if TYPE_CHECKING:
     from warp_mca.geometry.mesh import Mesh
@@ -30,14 +30,14 @@ FLAT = 1.25  # exponent of W(d) up to which a place is flat [-]
 # edge strikes. The shorter step is needed, too: crushed cells flatten, and became unstable with 2.
 PENALTY = 10.0
 FINEST = 4.0  # times smaller than the cells there, at most: steps are as many times more [-]
-# Cells that are so many times greater than those over the crushed depth would be are told of [-]. With across=2 they
-# were 24 times on an aluminium cylinder on its side, whose greatest force was 10 % less than with 1; 7 times on a ball
-# of ABS, with 1 % less where cells were half as large. On a steel cylinder on its side, 12 mm thick, they were 18 times
-# and the force 5 % below that of cells 2.5 times smaller; 8 times, and 6 % above it.
-_FAR = 10.0
+# Cells that are so many times greater than those over the crushed depth would be are told of [-]. The depth is that of
+# the finer cells: on those before, a round side is a corner, which is crushed up to three times as deep. A ball of ABS
+# had 11 times, and a greatest force 1 % below that of cells half as large; a steel cylinder on its side, 12 mm thick,
+# had 27 times with across=1 and 38 with 2, and was 6 % above and 5 % below; one of aluminium, 42 times and 10 %.
+_FAR = 16.0
 _TOLD = (
     "the fall crushes {name} about {depth:.2g} m deep, where its cells are {size:.2g} m, a quarter of those without: "
-    "its greatest force may be some 10 % off; give struck a smaller size"
+    "its greatest force may be some 10 % off; give struck a smaller size, as {wanted:.1g}"
 )
 _WORTH = 0.7  # of their size: cells that are not smaller are left as they are [-]
 _LEAST, _MOST = 1e-5, 0.2  # depths over the height of the parts, below which all is flat and above which none is [-]
@@ -58,16 +58,39 @@ def finer_where_struck(
     """
     from warp_mca.geometry.cad import Cad
 
-    drawn = [(body, mesh) for body, mesh in zip(bodies, meshes, strict=True) if isinstance(body.geometry, Cad)]
-    if struck == "off" or not drawn:
+    if struck == "off" or not any(isinstance(body.geometry, Cad) for body in bodies):
         return []
-    parts = {body.name: _cells(body, mesh) for body, mesh in drawn}
-    lowest = min(float(in_place(body, mesh)[:, 2].min()) for body, mesh in zip(bodies, meshes, strict=True))
+    parts, lowest, depth = _looked_at(bodies, meshes, energy)
+    found = [_finer(body, parts.get(body.name), lowest, depth, struck) for body in bodies]
+    if all(one is other for one, other in zip(found, bodies, strict=True)):
+        return []
+    if struck == "auto":
+        depth = _looked_at(found, [mesh_of(body) for body in found], energy)[2]
+        changed = [one is not other for one, other in zip(found, bodies, strict=True)]
+        found = [_told(body, depth) if new else body for body, new in zip(found, changed, strict=True)]
+    return found
+
+
+def _looked_at(bodies: Sequence[Body], meshes: Sequence[Mesh], energy: float) -> tuple[dict[str, _Cells], float, float]:
+    """Cells of the bodies of CAD files by name, the lowest height of all [m], and the crushed depth [m], 0 if flat."""
+    from warp_mca.geometry.cad import Cad
+
+    pairs = list(zip(bodies, meshes, strict=True))
+    parts = {body.name: _cells(body, mesh) for body, mesh in pairs if isinstance(body.geometry, Cad)}
+    lowest = min(float(in_place(body, mesh)[:, 2].min()) for body, mesh in pairs)
     heights = np.concatenate([part.heights for part in parts.values()]) - lowest
     depth, exponent = crushed_depth(heights, np.concatenate([part.work for part in parts.values()]), energy)
-    depth = depth if exponent > FLAT else 0.0
-    found = [_finer(body, parts.get(body.name), lowest, depth, struck) for body in bodies]
-    return found if any(one is not other for one, other in zip(found, bodies, strict=True)) else []
+    return parts, lowest, depth if exponent > FLAT else 0.0
+
+
+def _told(body: Body, depth: float) -> Body:
+    """A body with finer cells, which says so if these are coarse for the crushed depth [m]."""
+    geometry: Any = body.geometry
+    size, wanted = geometry.finer[-1].size, _FAR * depth / (ROWS * geometry.across)
+    if not 0.0 < wanted < size:
+        return body
+    note = _TOLD.format(name=body.name, depth=depth, size=size, wanted=wanted)
+    return replace(body, geometry=replace(geometry, notes=(*geometry.notes, note)))
 
 
 class _Cells(NamedTuple):
@@ -109,12 +132,10 @@ def _finer(body: Body, cells: _Cells | None, lowest: float, depth: float, struck
     size = max(crushed, finest) if isinstance(struck, str) else struck
     if size > _WORTH * usual:
         return body
-    told = (_TOLD.format(name=body.name, depth=depth, size=size),) if size == finest > _FAR * crushed else ()
     turn = rotation_matrix(np.array(body.rotation))
     above: Any = turn.T @ ((0.0, 0.0, lowest + max(depth, size)) - np.array(body.position))
     place = Finer(point=tuple(above.tolist()), normal=tuple(turn[2].tolist()), size=size)
-    changed = replace(geometry, finer=(*geometry.finer, place), notes=(*geometry.notes, *told))
-    return replace(body, geometry=changed, kinematics="finite")
+    return replace(body, geometry=replace(geometry, finer=(*geometry.finer, place)), kinematics="finite")
 
 
 def crushed_depth(heights: Array, work: Array, energy: float) -> tuple[float, float]:
