@@ -68,17 +68,16 @@ def on_fold(
         g = int(f)
         edge = int(k)
         folds = bool(False)
-        for _ in range(
-            wp.where(share > wp.float64(0.0), 1, AROUND)
-        ):  # the face beyond the edge, or all around a corner
+        most = wp.where(share > wp.float64(0.0), 1, AROUND)  # the face beyond the edge, or all around a corner
+        for _ in range(most):
             g = master.across[g, edge]
             if folds or g < 0 or g == f:
                 break
             edge = corner_of(master.face, g, i)
             normal = normal_at_edge(X, u, master.face, g, edge, share, x + foot)
             below, least = wp.dot(foot, normal), wp.dot(near.normal, normal)
-            most = wp.min(below * below, turned * turned * wp.length_sq(normal))
-            folds = below > wp.float64(0.0) and (least < wp.float64(0.0) or most >= square * least * least)
+            between = wp.min(below * below, turned * turned * wp.length_sq(normal)) >= square * least * least
+            folds = below > wp.float64(0.0) and (least < wp.float64(0.0) or between)
         if folds:
             depth = wp.sqrt(square)
             near.at = coordinates_on_edge(k, share, triangle)
