@@ -6,7 +6,6 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.bond import HOLDS, hold_bond
-from warp_mca.kernels.contact.fold import on_fold
 from warp_mca.kernels.contact.laws import PLAIN, Laws
 from warp_mca.kernels.contact.nearest import Master, nearest_function
 from warp_mca.kernels.contact.pairs import Pairs, pair_factor
@@ -94,7 +93,6 @@ def surface_kernel(
                 if wp.static(noted):
                     recent_out[i] = recent(recent_out[i], force)
         if near.face >= 0 and holds and not bonded:
-            near = on_fold(X, u, master, X[i] + u[i], near)
             touch = meet_side(X, u, v, master, i, near, stiffness[s], dt, held, along)
             if wp.static(general):
                 factor = pair_factor(pairs, s, near.face)

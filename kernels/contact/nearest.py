@@ -25,15 +25,12 @@ class Master:
 
     Attributes:
         face: nodes, shape (face_count, 4), int32; a triangle has its last node twice.
-        across: the face of the same side beyond the edge from each corner to the next, or -1, shape (face_count, 4),
-            int32.
         stiffness: penalty stiffness of each face [N/m], shape (face_count,), float64.
         count: number of candidate faces of each spring, shape (spring_count,), int32.
         candidate: those faces, shape (spring_count, LIST_LENGTH), int32.
     """
 
     face: wp.array2d(dtype=wp.int32)
-    across: wp.array2d(dtype=wp.int32)
     stiffness: wp.array(dtype=wp.float64)
     count: wp.array(dtype=wp.int32)
     candidate: wp.array2d(dtype=wp.int32)

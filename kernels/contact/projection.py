@@ -183,46 +183,6 @@ def is_edge(
 
 
 @wp.func
-def edge_beyond(at: wp.vec2d, triangle: bool) -> int:
-    """The edge, by its first corner, beyond which a point at these natural coordinates lies farthest; -1 if none."""
-    zero, one = wp.float64(0.0), wp.float64(1.0)
-    k = int(-1)
-    if triangle:
-        rest = one - at[0] - at[1]
-        least = wp.min(rest, wp.min(at[0], at[1]))
-        if least < zero:
-            k = wp.where(least == rest, 1, wp.where(least == at[0], 2, 0))
-    elif wp.max(wp.abs(at[0]), wp.abs(at[1])) > one:
-        k = wp.where(at[1] > zero, 2, 0)
-        if wp.abs(at[0]) > wp.abs(at[1]):
-            k = wp.where(at[0] > zero, 1, 3)
-    return k
-
-
-@wp.func
-def place(X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), i: int) -> wp.vec3d:
-    """Where node i is [m]."""
-    return X[i] + u[i]
-
-
-@wp.func
-def nearest_on_edge(
-    X: wp.array(dtype=wp.vec3d),
-    u: wp.array(dtype=wp.vec3d),
-    face: wp.array2d(dtype=wp.int32),
-    f: int,
-    k: int,
-    x: wp.vec3d,
-):
-    """The point nearest to x on the edge from corner k of face f: its share of the way, and the vector to it from x."""
-    last = k == 3 or (k == 2 and face[f, 2] == face[f, 3])
-    start = place(X, u, face[f, k]) - x
-    along = place(X, u, face[f, wp.where(last, 0, k + 1)]) - x - start
-    share = wp.clamp(-wp.dot(start, along) / wp.length_sq(along), wp.float64(0.0), wp.float64(1.0))
-    return share, start + share * along
-
-
-@wp.func
 def distance_to_face(
     X: wp.array(dtype=wp.vec3d),
     u: wp.array(dtype=wp.vec3d),
@@ -230,12 +190,19 @@ def distance_to_face(
     f: int,
     x: wp.vec3d,
     at: wp.vec2d,
-    away: wp.vec3d,
     triangle: bool,
 ) -> wp.float64:
-    """Distance of x to a face [m]; `away` leads from its nearest point, which may lie beyond its edges, to x."""
-    k = edge_beyond(at, triangle)
-    if k < 0:
-        return wp.length(away)
-    _share, foot = nearest_on_edge(X, u, face, f, k, x)
+    """Distance of a point to a face, whose natural coordinates `at` of the foot may lie beyond its edges [m]."""
+    one = wp.float64(1.0)
+    on = wp.vec2d(wp.clamp(at[0], -one, one), wp.clamp(at[1], -one, one))
+    if triangle:
+        on = wp.vec2d(wp.max(at[0], wp.float64(0.0)), wp.max(at[1], wp.float64(0.0)))
+        on = on / wp.max(on[0] + on[1], one)
+    foot = interpolate(
+        weights_at(on, triangle),
+        X[face[f, 0]] + u[face[f, 0]] - x,
+        X[face[f, 1]] + u[face[f, 1]] - x,
+        X[face[f, 2]] + u[face[f, 2]] - x,
+        X[face[f, 3]] + u[face[f, 3]] - x,
+    )
     return wp.length(foot)

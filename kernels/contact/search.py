@@ -239,7 +239,7 @@ def clear_kernel(each: bool, sides: int) -> Any:
             distance = depth
             closer = depth < nearest or (depth == nearest and gap >= wp.float64(0.0))
             if wp.static(sides > 1):
-                distance = distance_to_face(X, u, face, f, x, at, away, triangle)
+                distance = distance_to_face(X, u, face, f, x, at, triangle)
                 closer = distance < nearest
                 if wp.abs(distance - nearest) <= wp.float64(EQUAL) * nearest:
                     closer = depth > plane or (depth == plane and gap >= wp.float64(0.0))

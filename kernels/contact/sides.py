@@ -13,7 +13,6 @@ from warp_mca.kernels.contact.bond import hold_node
 from warp_mca.kernels.contact.contact import BLOCK_DIM
 from warp_mca.kernels.contact.edge_rest import release_function
 from warp_mca.kernels.contact.edges import Surfaces, greatest_stiffness
-from warp_mca.kernels.contact.fold import on_fold
 from warp_mca.kernels.contact.laws import PLAIN, Laws
 from warp_mca.kernels.contact.nearest import nearest_face
 from warp_mca.kernels.contact.search import STALE, moved_too_far
@@ -86,7 +85,6 @@ def sided_kernel(friction: bool, each: bool, sides: int, laws: Laws = PLAIN, slo
                     near.front = front  # of every side so far
                     held, pressed = spring.held[e], spring.face[e] >= 0
                     if near.face >= 0:
-                        near = on_fold(at.X, at.u, at.master, x, near)
                         touch = meet(v, at.master.face, i, near, dt, held, wp.vec3f(pressure(e, spring)))
                         touches = may_press(at, s, near, held, pressed, touch.du, node, fronts, front_face, recent_out)
                         if step == 0:

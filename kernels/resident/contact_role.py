@@ -9,7 +9,6 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.contact import LANES
-from warp_mca.kernels.contact.fold import on_fold
 from warp_mca.kernels.contact.laws import Laws
 from warp_mca.kernels.contact.nearest import Master, Nearest, nearest_function
 from warp_mca.kernels.contact.search import STALE, moved_too_far
@@ -65,7 +64,6 @@ def contact_role(friction: bool, laws: Laws) -> Any:
     ):
         """Press a node or release it, as `contact.surface_kernel` does."""
         if near.face >= 0:
-            near = on_fold(X, state_out.u, master, X[i] + state_out.u[i], near)
             touch = meet_side(X, state_out.u, state_out.v, master, i, near, slaves.stiffness[s], dt, held, along)
             left = leave(s, i, X, state_out.u, state_out.v, master, touch, spring)
             state_out.nodal_force[i] = state_out.nodal_force[i] + (

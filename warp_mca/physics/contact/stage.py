@@ -20,7 +20,6 @@ from warp_mca.physics.contact.dashpots import check_dashpots
 from warp_mca.physics.contact.friction_laws import friction_rows
 from warp_mca.physics.contact.per_scene import device_pairs, numbers, per_scene, vectors
 from warp_mca.physics.contact.slave_edges import SlaveEdges, faces_of_slaves, new_springs
-from warp_mca.physics.contact.surfaces import faces_across
 from warp_mca.system.contact import LIST_LENGTH, SLOTS, ContactPass
 from warp_mca.system.reading import on_host
 from warp_mca.system.threads import CONTACT, Split, whole
@@ -129,14 +128,14 @@ class ContactStage:
         self.deepest = numbers([item.deepest for item in self.items])
 
     def _make_faces(self, model: Model) -> None:
+        faces = offsets([len(item.face) for item in self.items])
+        masters = offsets([len(item.master) for item in self.items])
         self.longest = numbers([item.longest for item in self.items])
         self._place(model)
-        counts = ([len(getattr(item, name)) for item in self.items] for name in ("face", "master"))
-        self.face_scene, self.master_scene = (per_scene(offsets(count)) for count in counts)
-        faces, side = self._join("face"), self._join("side")
-        self.face, self.across = (wp.array(rows, dtype=wp.int32) for rows in (faces, faces_across(faces, side)))
+        self.face_scene, self.master_scene = per_scene(faces), per_scene(masters)
+        self.face = wp.array(self._join("face"), dtype=wp.int32)
         self.face_stiffness = wp.array(self._join("face_stiffness"), dtype=wp.float64)
-        self.side = wp.array(side, dtype=wp.int32) if self.sides > 1 else 0
+        self.side = wp.array(self._join("side"), dtype=wp.int32) if self.sides > 1 else 0
         self.master = wp.array(self._join("master"), dtype=wp.int32)
         self.face_offset, self.face_of_node = self._rows("face", "face_offset", "face_of_node")
         self.pairs, self.edges = device_pairs([item.pairs for item in self.items]), None
@@ -268,7 +267,7 @@ class ContactStage:
     def faces_of(self, own: ContactState) -> Any:
         """The master's faces with what the latest search listed."""
         found = nearest.Master()
-        found.face, found.across, found.stiffness = self.face, self.across, self.face_stiffness
+        found.face, found.stiffness = self.face, self.face_stiffness
         found.count, found.candidate = own.count, own.candidate
         return found
 
@@ -285,7 +284,8 @@ class ContactStage:
         """Both surfaces, as the kernel of a master with several sides takes them."""
         assert self.edges
         found = edges.Surfaces()
-        found.X, found.u, found.slaves, own = work.X, state.u, self.edges.faces, state.contacts[self.index]
+        own = state.contacts[self.index]
+        found.X, found.u, found.slaves = work.X, state.u, self.edges.faces
         found.master, found.pairs = self.faces_of(own), self.pairs_of(own)
         return found
 

@@ -86,29 +86,6 @@ def _faces_around(nodes: Index, face: Index) -> tuple[Index, Index]:
     return offset.astype(np.int32), (order // 4).astype(np.int32)
 
 
-def faces_across(face: Index, side: Index) -> Index:
-    """The face of the same side beyond the edge from each corner of a face to the next, or -1, shape (face_count, 4).
-
-    Args:
-        face: corners, shape (face_count, 4), int32; a triangle has its last one twice, and none beyond its last edge.
-        side: of each face, shape (face_count,), int32; each presses a node by a spring of its own.
-    """
-    triangle, ends = is_triangle(face), np.stack([face, np.roll(face, -1, axis=1)], axis=2)
-    ends[triangle, 2, 1] = face[triangle, 0]
-    ends.sort(axis=2)
-    edge = ends.reshape(-1, 2)
-    order = np.lexsort(edge.T)
-    alone = np.zeros(face.shape, dtype=bool)
-    alone[:, 3] = triangle
-    order = order[~alone.ravel()[order]]
-    same = np.flatnonzero((edge[order[1:]] == edge[order[:-1]]).all(axis=1))
-    found = np.full(face.size, -1, np.int32)
-    one, other = order[same], order[same + 1]
-    alike = side[one // 4] == side[other // 4]
-    found[one[alike]], found[other[alike]] = other[alike] // 4, one[alike] // 4
-    return found.reshape(face.shape)
-
-
 def _returns(contact: Contact | ContactAll) -> bool:
     """Whether springs return the energy of closing and opening: those without a penalty."""
     plain = contact.law is None or not contact.law.damping(0.0)
