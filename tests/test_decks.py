@@ -236,6 +236,7 @@ def test_units_belong_to_decks(tmp_path: Path, capsys: pytest.CaptureFixture[str
         ("*CASE_BEGIN_1\n*INITIAL_VELOCITY_NODE\n101,0,0,0.\n*CASE_END_1\n", r"\*CASE_BEGIN_1 .*\*CASE_END_1"),
         ("*RIGIDWALL_PLANAR\n0\n0,0,-1,0,0,0,2.\n", "FRIC = 2 is not read"),
         ("*PART\nthird\n3,1,9\n*ELEMENT_SOLID\n9,3,1,2,4,3,5,6,8,7\n", "part 3 has no material 9"),
+        ("*SENSOR_CONTROL\n1,CONTACT,1\n1,ON\n", r"\*SENSOR_CONTROL .* not read"),
         ("*CONTROL_TERMINATION\n1e-6,100\n", "ENDCYC = 100 is not read"),
         ("*INITIAL_VELOCITY\n77\n1.\n", "there is no .SET_NODE 77; add it to the deck"),
     ],
