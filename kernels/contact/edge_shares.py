@@ -19,6 +19,15 @@ def slid_off(e: int, spring: Spring) -> bool:
     return spring.bears[e] == 1 and (spring.face[e] < 0 or spring.support[e] >= 0)
 
 
+@wp.func
+def has_support(start: int, end: int, spring: Spring) -> int:
+    """1 where one of these springs has a support, else 0."""
+    found = int(0)
+    for e in range(start, end):
+        found = wp.where(spring.support[e] >= 0, 1, found)
+    return found
+
+
 @cache
 def carry_kernel(sides: int) -> Any:
     """Kernel: each slave node takes its share of the forces on its edges to nodes that slid off, in a fixed order."""

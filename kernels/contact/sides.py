@@ -12,6 +12,7 @@ import warp as wp
 from warp_mca.kernels.contact.bond import hold_node
 from warp_mca.kernels.contact.contact import BLOCK_DIM
 from warp_mca.kernels.contact.edge_rest import release_function
+from warp_mca.kernels.contact.edge_shares import has_support
 from warp_mca.kernels.contact.edges import Surfaces, greatest_stiffness
 from warp_mca.kernels.contact.laws import PLAIN, Laws
 from warp_mca.kernels.contact.nearest import nearest_face
@@ -27,6 +28,13 @@ from warp_mca.kernels.contact.spring import Spring, pressure_function
 from warp_mca.kernels.contact.way_back import note_way, recent, way_ends
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.per_scene import kind, value_function
+
+
+@wp.func
+def add_force(i: int, force: wp.vec3d, nodal_force: wp.array(dtype=wp.vec3d), recent_force: wp.array(dtype=wp.vec3d)):
+    """Add a contact force to those of a node, and to its recent one."""
+    nodal_force[i] = nodal_force[i] + force
+    recent_force[i] = recent(recent_force[i], force)
 
 
 @cache
@@ -102,12 +110,8 @@ def sided_kernel(friction: bool, each: bool, sides: int, laws: Laws = PLAIN, slo
                             of(mu, k), scale, dt, spring, normal_force_out, recent_out, flag_out
                         )  # fmt: skip
         if active:
-            nodal_force_out[i] = nodal_force_out[i] + total
-            recent_out[i] = recent(recent_out[i], total)
-            rests = int(0)
-            for e in range(start, end):
-                rests = wp.where(spring.support[e] >= 0, 1, rests)
-            spring.rests[s] = rests
+            add_force(i, total, nodal_force_out, recent_out)
+            spring.rests[s] = has_support(start, end, spring)
         if moved_too_far(at.u[i], u_search[i], of(margin, k)):
             flag_out[k, STALE] = 1
 
