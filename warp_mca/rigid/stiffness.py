@@ -18,7 +18,8 @@ from warp_mca.base.blas import one_blas_thread
 
 Array = NDArray[np.float64]
 
-MOST_WORK = 3e9  # multiplications of the factors of a piece
+MOST_WORK = 1e11  # multiplications of the factors of a piece
+SHIFTS = (0.0, 1e-5, 1e-3)  # of the typical diagonal, more of which is added where noise has spoilt a piece's factors
 SHIFT = 1e-7  # of the typical diagonal over the typical mass, times the masses: motions without stiffness have this
 
 
@@ -64,8 +65,8 @@ def stiffness_matrix(
 def inverse(K: sparse.csc_array, masses: Array) -> tuple[Callable[[Array], Array], bool] | None:
     """The function r -> p with K p = r, both of shape (node_count, 3), float64 [N, m], and whether it is exact.
 
-    Axes without stiffness stay. Pieces that are not slender, whose factors would take more than MOST_WORK, have the
-    inverse of their diagonal. None where K is not positive.
+    Axes without stiffness stay. Pieces whose factors would take more than MOST_WORK have the inverse of their diagonal.
+    None where K is not positive, with a shift neither.
 
     masses: of the nodes [kg], shape (node_count,), float64.
     """
@@ -74,20 +75,18 @@ def inverse(K: sparse.csc_array, masses: Array) -> tuple[Callable[[Array], Array
     weight = np.repeat(np.maximum(masses, 1e-3 * masses.max()) / masses.max(), 3)
     shifted = sparse.csr_array(K + sparse.diags_array(SHIFT * float(np.median(diagonal[stiff])) * weight * stiff))
     pieces = connected_components(shifted, directed=False)[1]
-    factors, rough = [], stiff.copy()
+    factors, rough, exact = [], stiff.copy(), True
     for k in np.unique(pieces[stiff]):
         mine = np.flatnonzero(pieces == k)
         part = sparse.csr_array(shifted[mine][:, mine])
         order = reverse_cuthill_mckee(part, symmetric_mode=True)
         ordered = sparse.coo_array(part[order][:, order])
         if float(_width(ordered)) ** 2 * len(mine) <= MOST_WORK:
-            try:
-                with one_blas_thread():
-                    factor = cholesky_banded(_band(ordered, len(mine)), overwrite_ab=True, lower=True)
-                factors.append((mine[order], factor))
-            except LinAlgError:
+            found = next(filter(None, (_factors(ordered, len(mine), shift) for shift in SHIFTS)), None)
+            if found is None:
                 return None
-            rough[mine] = False
+            factors.append((mine[order], found[0]))
+            exact, rough[mine] = exact and found[1] == 0.0, False
 
     def solve(r: Array) -> Array:
         known = r.ravel()
@@ -97,7 +96,18 @@ def inverse(K: sparse.csc_array, masses: Array) -> tuple[Callable[[Array], Array
                 p[order] = cho_solve_banded((factor, True), known[order])
         return p.reshape(r.shape)
 
-    return solve, not rough.any()
+    return solve, exact and not rough.any()
+
+
+def _factors(K: sparse.coo_array, count: int, shift: float) -> tuple[Array, float] | None:
+    """Those of a matrix of `count` rows, to whose diagonal that share of its median is added, and the shift."""
+    band = _band(K, count)
+    band[0] += shift * np.median(band[0])
+    try:
+        with one_blas_thread():
+            return cholesky_banded(band, overwrite_ab=True, lower=True), shift
+    except LinAlgError:
+        return None
 
 
 def _width(K: sparse.coo_array) -> int:
