@@ -31,10 +31,10 @@ from warp_mca.kernels.hardware.per_scene import kind, value_function
 
 
 @wp.func
-def add_force(i: int, force: wp.vec3d, nodal_force: wp.array(dtype=wp.vec3d), recent_force: wp.array(dtype=wp.vec3d)):
+def add_force(i: int, force: wp.vec3d, nodal_force_out: wp.array(dtype=wp.vec3d), recent_out: wp.array(dtype=wp.vec3d)):
     """Add a contact force to those of a node, and to its recent one."""
-    nodal_force[i] = nodal_force[i] + force
-    recent_force[i] = recent(recent_force[i], force)
+    nodal_force_out[i] = nodal_force_out[i] + force
+    recent_out[i] = recent(recent_out[i], force)
 
 
 @cache
