@@ -103,6 +103,36 @@ def test_a_crossing_that_begins_at_a_node_is_as_strong_as_between_nodes(one: int
     assert impulse == pytest.approx(between, abs=0.04 * np.linalg.norm(between))
 
 
+@pytest.mark.parametrize("axis", [(0.0, 1.0, 1.0), (1.0, 1.0, 1.0)], ids=["edge", "corner"])
+@pytest.mark.parametrize(("off", "most"), [(0.0, 1e-3), (1e-7, 5e-3)])  # from a node
+@pytest.mark.parametrize("general", [False, True])
+def test_an_edge_or_a_corner_that_meets_a_node_head_on_is_not_pushed_aside(
+    axis: tuple, off: float, most: float, general: bool
+):
+    """The node is behind two or three faces alike, each of which alone would push it along its own normal."""
+    turn, _ = Rotation.align_vectors([[0.0, -1.0, 0.0]], [axis])
+    middle, velocity = (off, W * math.hypot(*axis) / 2 + 1e-7, 0.0), (0.0, -3.0, 0.0)
+    cube = mca.Box(size=(W, W, W), divisions=(4, 4, 4), origin=(-W / 2, -W / 2, -W / 2))
+    bodies = (
+        mca.Body(name="low", geometry=cube, material=STEEL, position=(0.0, -W / 2, 0.0)),
+        mca.Body(
+            name="top",
+            geometry=cube,
+            material=STEEL,
+            position=middle,
+            rotation=tuple(turn.as_rotvec().tolist()),
+            velocity=velocity,
+        ),
+    )
+    skins = (mca.Surface(body=name, nodes="boundary") for name in ("low", "top"))
+    meet = mca.ContactAll() if general else mca.Contact(slave=next(skins), master=next(skins), two_way=True)
+    phase = mca.ImpactPhase(duration=3e-5, output_interval=1e-6)
+    impact = finished(mca.Scene(name="head_on", bodies=bodies, contacts=(meet,), impact=phase))
+    pushed = momentum(impact, 0, len(impact.solver.model.X) // 2)
+    assert abs(pushed[1]) > 0.3 * STEEL.rho * W**3 * 3.0
+    assert math.hypot(pushed[0], pushed[2]) < most * abs(pushed[1])
+
+
 def test_an_edge_meets_a_rigid_bar():
     result = result_of(finished(crossed(7, 1, rigid=True)))
     assert result.summary["contacts"][0][0] == pytest.approx(4e-6, abs=1.1e-6)

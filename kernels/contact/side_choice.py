@@ -11,7 +11,7 @@ from warp_mca.kernels.contact.nearest import Nearest, edge_of
 from warp_mca.kernels.contact.projection import area_vector, is_edge
 from warp_mca.kernels.contact.settle import Touch
 from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring, pressure_function
-from warp_mca.kernels.contact.way_back import OPPOSES, WayBack, way_back_function
+from warp_mca.kernels.contact.way_back import OPPOSES, WayBack, head_on, way_back_function
 
 _ROUNDING = 1e-6  # a node penetrates a side beyond this depth, as a fraction of an edge
 
@@ -162,7 +162,7 @@ def choice_functions(friction: bool, sides: int) -> tuple[Any, Any]:
             if node.holding:
                 other = keeper(at, near.face, node.begin, spring)
             if touches and other < 0:
-                way = way_back(at, s, node.begin, e, near, along, spring, recent_force)
+                way = way_back(at, s, node.begin, e, near, touch.du, along, spring, recent_force)
         edge = edge_of(near)
         approach = -wp.dot(touch.du, near.normal)
         before = wp.max(-near.gap - approach - wp.float64(_ROUNDING) * edge, wp.float64(0.0))
@@ -204,6 +204,9 @@ def choice_functions(friction: bool, sides: int) -> tuple[Any, Any]:
         choice: Choice,
         spring: Spring,
     ) -> Touch:
+        """The choice applied to a side. A node that meets an edge head-on is pressed by both sides: the sum of their
+        forces halves the angle between them.
+        """
         found = touch
         found.touches = touches
         if e == choice.newcomer:
@@ -215,8 +218,10 @@ def choice_functions(friction: bool, sides: int) -> tuple[Any, Any]:
         elif e == choice.leaver or (choice.passed >> (e - node.begin)) % 2 == 1:
             found.touches = bool(False)
         elif spring.face[e] < 0 and choice.face >= 0:
+            approach = -wp.dot(touch.du, near.normal)
             if is_edge(at.X, at.u, at.master.face, near.face, choice.face, choice.normal):
-                found.touches = bool(False)
+                found.touches = head_on(-near.gap - approach - choice.depth, approach, choice.approach, edge_of(near))
+                found.begins = wp.max(approach, wp.float64(0.0))
         return found
 
     return choose, confirm

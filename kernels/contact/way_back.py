@@ -16,6 +16,8 @@ _USUAL = 4.0  # largest depth of a node that comes over an edge, over the depth 
 _SAGS = 5e-3  # the same of a node that was pressed, besides, as a share of an edge: bodies sag under stiff springs
 _RIM = 0.01  # fraction of half an edge by which such a node may lie off the face to which it comes
 _FADES = 0.99  # share of a recent force that is kept from step to step
+_EVEN = 0.01  # difference of the depths behind two sides of a node that meets their edge head-on, as a share of an edge
+_ALIKE = 1e-3  # the same of its speeds of approach, as a share of them
 _ALONG = 0.7  # least cosine between that force and the normal
 
 
@@ -80,6 +82,14 @@ def slides_at(depth: wp.float64, usual: wp.float64, edge: wp.float64) -> bool:
 
 
 @wp.func
+def head_on(depths: wp.float64, one: wp.float64, other: wp.float64, edge: wp.float64) -> bool:
+    """Whether a node meets an edge head-on: the difference of its `depths` behind two sides is small, and it approaches
+    `one` as fast as the `other`."""
+    alike = wp.abs(one - other) <= wp.float64(_ALIKE) * wp.abs(one)
+    return alike and wp.abs(depths) <= wp.float64(_EVEN) * edge
+
+
+@wp.func
 def way_ends(near: Nearest, elsewhere: bool) -> bool:
     """Whether a node that a side does not press is no more on its way over the edge: it is in front of the side, or
     below it without being pressed, or another side presses it `elsewhere`."""
@@ -107,6 +117,7 @@ def way_back_function(sides: int) -> Any:
         begin: int,
         e: int,
         near: Nearest,
+        du: wp.vec3d,
         along: wp.vec3f,
         spring: Spring,
         recent_force: wp.array(dtype=wp.vec3d),
@@ -146,6 +157,9 @@ def way_back_function(sides: int) -> Any:
                         its = opposition(at, s, home.normal)
                         within = -home.gap <= limit or slides_at(home.gap, usual, edge)
                         pressed = usual > wp.float64(0.0)
+                        approach = -wp.dot(du, near.normal)
+                        if head_on(home.gap - near.gap, -wp.dot(du, home.normal), approach, edge):
+                            within = bool(False)
                         better = pressed and not slides
                         if pressed == slides:
                             better = -home.gap < shallowest
