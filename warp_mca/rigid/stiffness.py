@@ -19,8 +19,8 @@ from warp_mca.base.blas import one_blas_thread
 Array = NDArray[np.float64]
 
 MOST_WORK = 1e11  # multiplications of the factors of a piece
-SHIFTS = (0.0, 1e-5, 1e-3)  # of the typical diagonal, more of which is added where noise has spoilt a piece's factors
 SHIFT = 1e-7  # of the typical diagonal over the typical mass, times the masses: motions without stiffness have this
+SHIFTS = (0.0, SHIFT, 1e-5, 1e-3)  # of the typical diagonal, added where noise has spoilt the factors of a piece
 
 
 def colours(pattern: sparse.csr_array) -> NDArray[np.int64]:
@@ -86,7 +86,7 @@ def inverse(K: sparse.csc_array, masses: Array) -> tuple[Callable[[Array], Array
             if found is None:
                 return None
             factors.append((mine[order], found[0]))
-            exact, rough[mine] = exact and found[1] == 0.0, False
+            exact, rough[mine] = exact and found[1] <= SHIFT, False
 
     def solve(r: Array) -> Array:
         known = r.ravel()
