@@ -264,7 +264,7 @@ def test_factors_have_the_same_bits_on_any_number_of_threads():
     try:
         for count in (1, 3):
             use(count)
-            solved = inverse(K, np.ones(len(r)))
+            solved = inverse(K)
             assert solved and solved[1] and number() == count
             found.append(solved[0](r))
     finally:

@@ -246,7 +246,7 @@ class _Search:
         if typical == 0.0:
             raise self.failure("it has no stiffness")
         self._diagonal = np.maximum(nodal, 1e-2 * typical)[:, None]
-        found = inverse(K, self._masses[:, 0])
+        found = inverse(K)
         self._factors = found is not None
         if found:
             self._inverse, self._exact = found

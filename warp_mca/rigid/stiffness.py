@@ -19,8 +19,8 @@ from warp_mca.base.blas import one_blas_thread
 Array = NDArray[np.float64]
 
 MOST_WORK = 1e11  # multiplications of the factors of a piece
-SHIFT = 1e-7  # of the typical diagonal over the typical mass, times the masses: motions without stiffness have this
-SHIFTS = (0.0, SHIFT, 1e-5, 1e-3)  # of the typical diagonal, added where noise has spoilt the factors of a piece
+SHIFTS = (1e-7, 1e-5, 1e-3)  # of the typical diagonal, added so that motions without stiffness have some; more where
+# noise spoils the factors of a piece
 
 
 def colours(pattern: sparse.csr_array) -> NDArray[np.int64]:
@@ -62,23 +62,20 @@ def stiffness_matrix(
     return sparse.csc_array(0.5 * (found + found.T))
 
 
-def inverse(K: sparse.csc_array, masses: Array) -> tuple[Callable[[Array], Array], bool] | None:
+def inverse(K: sparse.csc_array) -> tuple[Callable[[Array], Array], bool] | None:
     """The function r -> p with K p = r, both of shape (node_count, 3), float64 [N, m], and whether it is exact.
 
     Axes without stiffness stay. Pieces whose factors would take more than MOST_WORK have the inverse of their diagonal.
     None where K is not positive, with a shift neither.
-
-    masses: of the nodes [kg], shape (node_count,), float64.
     """
     diagonal = K.diagonal()
     stiff = diagonal > 0.0
-    weight = np.repeat(np.maximum(masses, 1e-3 * masses.max()) / masses.max(), 3)
-    shifted = sparse.csr_array(K + sparse.diags_array(SHIFT * float(np.median(diagonal[stiff])) * weight * stiff))
-    pieces = connected_components(shifted, directed=False)[1]
+    rows = sparse.csr_array(K)
+    pieces = connected_components(rows, directed=False)[1]
     factors, rough, exact = [], stiff.copy(), True
     for k in np.unique(pieces[stiff]):
         mine = np.flatnonzero(pieces == k)
-        part = sparse.csr_array(shifted[mine][:, mine])
+        part = rows[mine][:, mine]
         order = reverse_cuthill_mckee(part, symmetric_mode=True)
         ordered = sparse.coo_array(part[order][:, order])
         if float(_width(ordered)) ** 2 * len(mine) <= MOST_WORK:
@@ -86,7 +83,7 @@ def inverse(K: sparse.csc_array, masses: Array) -> tuple[Callable[[Array], Array
             if found is None:
                 return None
             factors.append((mine[order], found[0]))
-            exact, rough[mine] = exact and found[1] <= SHIFT, False
+            exact, rough[mine] = exact and found[1] == SHIFTS[0], False
 
     def solve(r: Array) -> Array:
         known = r.ravel()
