@@ -83,9 +83,9 @@ def slides_at(depth: wp.float64, usual: wp.float64, edge: wp.float64) -> bool:
 
 @wp.func
 def head_on(depths: wp.float64, one: wp.float64, other: wp.float64, edge: wp.float64) -> bool:
-    """Whether a node meets an edge head-on: the difference of its `depths` behind two sides is small, and it approaches
-    `one` as fast as the `other`."""
-    alike = wp.abs(one - other) <= wp.float64(_ALIKE) * wp.abs(one)
+    """Whether a node meets an edge head-on: the difference of its `depths` behind two sides is small, and it moves into
+    `one` as fast as into the `other`."""
+    alike = one > wp.float64(0.0) and wp.abs(one - other) <= wp.float64(_ALIKE) * one
     return alike and wp.abs(depths) <= wp.float64(_EVEN) * edge
 
 
