@@ -258,7 +258,8 @@ def test_factors_have_the_same_bits_on_any_number_of_threads():
     lattice = sparse.kron(sparse.kron(near[0], ones[1]), ones[2])
     lattice += sparse.kron(sparse.kron(ones[0], near[1]), ones[2])
     lattice += sparse.kron(sparse.kron(ones[0], ones[1]), near[2])
-    K = sparse.csc_array(sparse.kron(-lattice, np.array([[3.0, 1.0, 0.5], [1.0, 2.0, 0.3], [0.5, 0.3, 1.7]])))
+    tensor = np.array([[3.0, 1.0, 0.5], [1.0, 2.0, 0.3], [0.5, 0.3, 1.7]])
+    K = sparse.bsr_array(sparse.kron(-lattice, tensor), blocksize=(3, 3))
     r = np.random.default_rng(0).normal(size=(12 * 9 * 12, 3))
     found = []
     try:
