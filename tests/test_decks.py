@@ -271,3 +271,13 @@ def test_all_keywords_that_are_not_read_are_listed(tmp_path: Path):
         (note,) = (note for note in words if note.endswith(why))
         assert [name.split(" ")[0] for name in note.split("*")[1:]] == list(names)
     assert not any(word in note for word in ("TITLE", "KEYWORD") for note in words)
+
+
+@pytest.mark.parametrize(("slsfac", "endeng", "told"), [(0.1, 0.0, 0), (0.5, 0.0, 1), (0.0, 0.1, 1), (0.5, 0.1, 2)])
+def test_factors_of_penalties_and_ends_by_energy_are_said_to_be_left_out(
+    tmp_path: Path, slsfac: float, endeng: float, told: int
+):
+    more = "*CONTROL_CONTACT\n" + card("usual", [slsfac])
+    more += "*CONTROL_TERMINATION\n" + card("usual", [2e-6, 0, 0.0, endeng])
+    notes = mca.mesh(read(tmp_path, deck("usual", more)))["anvil"].notes
+    assert len([note for note in notes if "are left out: " in note]) == told

@@ -104,14 +104,16 @@ def test_a_crossing_that_begins_at_a_node_is_as_strong_as_between_nodes(one: int
 
 
 @pytest.mark.parametrize("axis", [(0.0, 1.0, 1.0), (1.0, 1.0, 1.0)], ids=["edge", "corner"])
-@pytest.mark.parametrize(("off", "most"), [(0.0, 1e-3), (1e-7, 5e-3)])  # from a node
+@pytest.mark.parametrize(  # distance from a node, speed aside
+    ("off", "aside", "most"), [(0.0, 0.0, 1e-3), (1e-7, 0.0, 5e-3), (1e-5, 0.0, 5e-3), (0.0, 0.1, 1e-2)]
+)
 @pytest.mark.parametrize("general", [False, True])
 def test_an_edge_or_a_corner_that_meets_a_node_head_on_is_not_pushed_aside(
-    axis: tuple, off: float, most: float, general: bool
+    axis: tuple, off: float, aside: float, most: float, general: bool
 ):
     """The node is behind two or three faces alike, each of which alone would push it along its own normal."""
     turn, _ = Rotation.align_vectors([[0.0, -1.0, 0.0]], [axis])
-    middle, velocity = (off, W * math.hypot(*axis) / 2 + 1e-7, 0.0), (0.0, -3.0, 0.0)
+    middle, velocity = (off, W * math.hypot(*axis) / 2 + 1e-7, 0.3 * off), (0.0, -3.0, aside)
     cube = mca.Box(size=(W, W, W), divisions=(4, 4, 4), origin=(-W / 2, -W / 2, -W / 2))
     bodies = (
         mca.Body(name="low", geometry=cube, material=STEEL, position=(0.0, -W / 2, 0.0)),

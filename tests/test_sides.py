@@ -47,6 +47,13 @@ def test_sides_of_tetrahedra_and_of_a_surface_as_rough_as_can_be():
     assert rough.max() < MAX_SIDES
 
 
+def test_sides_that_meet_in_a_point_alone_differ():
+    """As opposite sides of a pyramid do, all of which may press a node that its point meets."""
+    X = np.array([(0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (-1.0, 1.0, 1.0), (-1.0, 1.0, -1.0), (1.0, 1.0, -1.0)])
+    face = np.array([(0, 1 + k, 1 + (k + 1) % 4, 1 + (k + 1) % 4) for k in range(4)], np.int32)
+    assert len(set(find_sides(face, face_geometry(X, face)[1]))) == 4
+
+
 @pytest.mark.parametrize(("kind", "expected"), [("L", 1.0), ("U", 1.0)])
 def test_springs_of_a_right_fold_add_no_stiffness(kind: str, expected: float):
     mesh = frame(kind)

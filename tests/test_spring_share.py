@@ -91,6 +91,26 @@ def test_springs_take_nothing_of_the_force_of_a_wave():
     assert summary["contact_spring_loss"]["cube–plane"] == 0.0
 
 
+def test_nothing_is_said_of_a_round_bar_that_lands_on_its_end():
+    """It presses with Z v A, whatever its springs, which ring; its skin is curved elsewhere."""
+    radius, floor, steel = 0.01, mca.RigidPlane(normal=(1.0, 0.0, 0.0)), replace(STEEL, nu=0.3)
+    bar = mca.Rod(radius=radius, length=0.04, tip="flat", section=4, ring=2, axial=10)
+    body = mca.Body(name="bar", geometry=bar, material=steel, velocity=(-1.0, 0.0, 0.0)).place_on(floor, gap=1e-7)
+    scene = mca.Scene(
+        name="end",
+        bodies=(body,),
+        contacts=(mca.Contact(slave=mca.Surface(body="bar", nodes="boundary"), master=floor),),
+        impact=mca.ImpactPhase(duration=3e-5, output_interval=5e-7),
+    )
+    result = mca.run(scene)
+    (loss,), (share,) = (result.summary[f"contact_spring_{what}"].values() for what in ("loss", "share"))
+    wave = steel.rho * steel.wave_speeds["dilatational"] * math.pi * radius**2
+    assert result.F_n[1:6].mean() == pytest.approx(wave, rel=0.2)
+    assert share > 0.1
+    assert loss == 0.0
+    assert not any("springs held" in text for text in result.warnings)
+
+
 def test_finer_meshes_take_softer_springs():
     """The layer of springs of one cell's depth is as thin as the cell: its factor falls with it."""
 

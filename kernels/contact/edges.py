@@ -6,6 +6,8 @@ from warp_mca.kernels.contact.nearest import Master
 from warp_mca.kernels.contact.pairs import Pairs, pair_factor
 from warp_mca.kernels.contact.projection import area_vector
 
+_ACROSS = 0.1  # least cosine between the reversed normal of a face that lies across an edge and those of its two sides
+
 
 @wp.struct
 class SlaveFaces:
@@ -91,3 +93,14 @@ def opposition(at: Surfaces, s: int, normal: wp.vec3d) -> wp.float64:
         own = area_vector(at.X, at.u, at.slaves.face, at.slaves.face_of_slave[j])
         most = wp.max(most, -wp.dot(wp.normalize(own), wp.normalize(normal)))
     return most
+
+
+@wp.func
+def opposes_both(at: Surfaces, s: int, one: wp.vec3d, other: wp.vec3d) -> bool:
+    """Whether one of the faces around slave node s opposes both of these unit normals: it lies across their edge."""
+    found = bool(False)
+    for j in range(at.slaves.offset[s], at.slaves.offset[s + 1]):
+        own = wp.normalize(area_vector(at.X, at.u, at.slaves.face, at.slaves.face_of_slave[j]))
+        if wp.max(wp.dot(own, one), wp.dot(own, other)) < wp.float64(-_ACROSS):
+            found = bool(True)
+    return found

@@ -196,6 +196,7 @@ def choice_functions(friction: bool, sides: int) -> tuple[Any, Any]:
     @wp.func
     def confirm(
         at: Surfaces,
+        s: int,
         e: int,
         near: Nearest,
         touch: Touch,
@@ -220,7 +221,8 @@ def choice_functions(friction: bool, sides: int) -> tuple[Any, Any]:
         elif spring.face[e] < 0 and choice.face >= 0:
             approach = -wp.dot(touch.du, near.normal)
             if is_edge(at.X, at.u, at.master.face, near.face, choice.face, choice.normal):
-                even = head_on(-near.gap - approach - choice.depth, approach, choice.approach, edge_of(near))
+                depths = -near.gap - approach - choice.depth
+                even = head_on(at, s, touch.du, near.normal, choice.normal, depths, edge_of(near))
                 found.touches = even and (touches or near.front == wp.float64(FAR))
                 found.begins = wp.max(approach, wp.float64(0.0))
         return found

@@ -1,7 +1,8 @@
 """Owns contact with a master whose sides meet at sharp edges: a slave node has one spring for each side.
 
-Where two sides meet in a fold, both press a node at once. Where they meet at the edge of a solid, only one does: the
-side that the node penetrated first, until the node is nearer to another side that the faces of the slave oppose too.
+Where two sides meet in a fold, both press a node at once. At the edge of a solid all do if it meets the node head-on
+(`way_back.head_on`); else only the side that the node penetrated first, until the node is nearer to another side that
+the faces of the slave oppose too.
 """
 
 from functools import cache
@@ -98,7 +99,7 @@ def sided_kernel(friction: bool, each: bool, sides: int, laws: Laws = PLAIN, slo
                         if step == 0:
                             choice = choose(at, s, e, near, touch, touches, along, node, choice, spring, recent_out)
                         else:
-                            touch = confirm(at, e, near, touch, touches, node, choice, spring)
+                            touch = confirm(at, s, e, near, touch, touches, node, choice, spring)
                             touch.own = greatest_stiffness(at, s, near.face)
                             touch.limit = touch.own
                             total += leave(e, i, at.X, at.u, v, at.master, touch, spring)

@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from warp_mca.kernels.contact.edges import Surfaces, greatest_stiffness, is_on_rim, opposition
+from warp_mca.kernels.contact.edges import Surfaces, greatest_stiffness, is_on_rim, opposes_both, opposition
 from warp_mca.kernels.contact.nearest import ABOVE, SLACK, Nearest, edge_of, is_beside, nearest_face
 from warp_mca.kernels.contact.pairs import same_solid
 from warp_mca.kernels.contact.projection import lies_below
@@ -16,8 +16,8 @@ _USUAL = 4.0  # largest depth of a node that comes over an edge, over the depth 
 _SAGS = 5e-3  # the same of a node that was pressed, besides, as a share of an edge: bodies sag under stiff springs
 _RIM = 0.01  # fraction of half an edge by which such a node may lie off the face to which it comes
 _FADES = 0.99  # share of a recent force that is kept from step to step
-_EVEN = 0.01  # difference of the depths behind two sides of a node that meets their edge head-on, as a share of an edge
-_ALIKE = 1e-3  # the same of its speeds of approach, as a share of them
+_EVEN = 0.1  # difference of the depths behind two sides of a node that meets their edge head-on, as a share of an edge
+_ALIKE = 0.5  # least speed with which it moves into one of them, as a share of that into the other
 _ALONG = 0.7  # least cosine between that force and the normal
 
 
@@ -82,11 +82,19 @@ def slides_at(depth: wp.float64, usual: wp.float64, edge: wp.float64) -> bool:
 
 
 @wp.func
-def head_on(depths: wp.float64, one: wp.float64, other: wp.float64, edge: wp.float64) -> bool:
-    """Whether a node meets an edge head-on: the difference of its `depths` behind two sides is small, and it moves into
-    `one` as fast as into the `other`."""
-    alike = one > wp.float64(0.0) and wp.abs(one - other) <= wp.float64(_ALIKE) * one
-    return alike and wp.abs(depths) <= wp.float64(_EVEN) * edge
+def head_on(
+    at: Surfaces, s: int, du: wp.vec3d, one: wp.vec3d, other: wp.vec3d, depths: wp.float64, edge: wp.float64
+) -> bool:
+    """Whether slave node s, which moves by `du`, meets an edge head-on.
+
+    Then a face of the slave lies across the edge, the node moves into both of its sides, whose normals are `one` and
+    `other`, about as fast, and the difference of its `depths` behind them is small.
+    """
+    least, most = wp.min(-wp.dot(du, one), -wp.dot(du, other)), wp.max(-wp.dot(du, one), -wp.dot(du, other))
+    found = bool(False)
+    if least > wp.float64(0.0) and least >= wp.float64(_ALIKE) * most and wp.abs(depths) <= wp.float64(_EVEN) * edge:
+        found = opposes_both(at, s, one, other)
+    return found
 
 
 @wp.func
@@ -157,8 +165,7 @@ def way_back_function(sides: int) -> Any:
                         its = opposition(at, s, home.normal)
                         within = -home.gap <= limit or slides_at(home.gap, usual, edge)
                         pressed = usual > wp.float64(0.0)
-                        approach = -wp.dot(du, near.normal)
-                        if head_on(home.gap - near.gap, -wp.dot(du, home.normal), approach, edge):
+                        if head_on(at, s, du, near.normal, home.normal, home.gap - near.gap, edge):
                             within = bool(False)
                         better = pressed and not slides
                         if pressed == slides:

@@ -22,6 +22,7 @@ from warp_mca.scene.tied_surfaces import Tie
 SIDES = "ssid msid sstyp mstyp sboxid mboxid spr mpr"
 FRICTION = "fs fd dc vc vdc penchk bt dt"
 SCALES = "sfs sfm sst mst sfst sfmt fsf vsf"
+SLSFAC = 0.1  # default of *CONTROL_CONTACT
 WALL = 10.0  # penalty of rigid walls, which stop nodes at once in LS-DYNA: by default, nodes of Taylor's bar sink in
 _NAMES = {0: "segments", 4: "nodes"}  # of node sets by the type of a side
 NEAR = 0.05  # distance of nodes that are tied, as a share of the edge of the face [-]
@@ -49,6 +50,8 @@ class Contacts:
         self._content, self._places, self._bodies, self._duration = content, places, bodies, duration
         self.contacts: list[Contact | ContactAll] = []
         self.ties: list[tuple[Side, Side]] = []
+        self._control = content.last("contact_control", "slsfac rwpnal islchk shlthk penopt thkchg orien enmass")
+        self._scale = (self._control and self._control.number("slsfac")) or SLSFAC
         for item in content.found["contact"]:
             self._take(item)
         for item in content.found["wall"]:
@@ -98,8 +101,8 @@ class Contacts:
         if mu and (cap := card.number("vc", "stress")):
             laws.append(ShearCap(tau_max=cap))
         own = [scales.number(name, default=1.0) or 1.0 for name in ("sfs", "sfm")]
-        if own != [1.0, 1.0] or card.number("vdc"):
-            what = "SFS, SFM and VDC are left out: springs of contact are those of this program"
+        if own != [1.0, 1.0] or card.number("vdc") or self._scale != SLSFAC:
+            what = "SFS, SFM, VDC and SLSFAC are left out: springs of contact are those of this program"
             self._content.notes.append(f"{card.place}: {what}")
         return {"mu": factor * mu, "friction": tuple(laws)}
 
@@ -176,11 +179,10 @@ class Contacts:
         friction = card.number("fric")
         if not 0.0 <= friction <= 1.0:
             raise ValueError(f"{card.place}: FRIC = {friction:g} is not read: give 0 to 1, which sticks")
-        control = self._content.last("contact_control", "slsfac rwpnal islchk shlthk penopt thkchg orien enmass")
         numbers = self._on_wall(head, np.array(point), np.array(normal))
         plane = RigidPlane(point=(point[0], point[1], point[2]), normal=(normal[0], normal[1], normal[2]))
         for body in self._bodies:
-            if body.rigid and not (control and control.number("rwpnal")):
+            if body.rigid and not (self._control and self._control.number("rwpnal")):
                 self._content.notes.append(
                     f"{item.place}: rigid part {body.name} passes the wall, as RWPNAL of *CONTROL_CONTACT is 0"
                 )

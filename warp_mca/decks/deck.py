@@ -130,6 +130,8 @@ def _duration(content: Content) -> float:
     if card is None or not card.number("endtim", "time") > 0.0:
         raise ValueError("no *CONTROL_TERMINATION gives an end above 0; add it")
     card.refuse("endcyc", "give the end by ENDTIM alone")
+    if any(card.number(name) for name in ("dtmin", "endeng", "endmas")):
+        content.notes.append(f"{card.place}: DTMIN, ENDENG and ENDMAS are left out: guards of this program end a run")
     return card.number("endtim", "time")
 
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 # springs hold then; measured on balls, links and edges within a factor of 2, see docs/decisions.md.
 PEAK_LOSS = 0.3
 # Force of a flat contact over that of one wave up to which it may be that wave: with default springs, and with others,
-# which may ring at 3.4 times that force.
+# such as those of curved skins that land on a flat end, which may ring at 3.4 times that force.
 WAVE = (1.3, 4.0)
 CROSSINGS = 4.0  # of a body by waves, after which a drive presses it as slowly as no wave tells
 STILL = 1e-6  # share of a relative velocity along the normal up to which bodies do not approach each other
@@ -157,10 +157,11 @@ def spring_shares(
         row = _row_at_rest(c, k, force, greatest)
         if row is None:
             share = float(held[greatest] / exchanged[greatest])
-            flat = contact if isinstance(contact, Contact) and k not in curved else None
-            edges, loss = flat is not None and on_edges(c, k, depths), PEAK_LOSS * share
-            hard = energy["plastic"][greatest] <= _PLASTIC * exchanged[greatest]
-            landed = _loss_of_landing(c, k, float(force[greatest]), depths) if hard else None
+            lands = _lands_flat(c, k, depths)  # as a round bar does with its end, though its skin is curved
+            flat = contact if isinstance(contact, Contact) and (lands or k not in curved) else None
+            edges, loss, landed = flat is not None and on_edges(c, k, depths), PEAK_LOSS * share, None
+            if flat is not None and lands and energy["plastic"][greatest] <= _PLASTIC * exchanged[greatest]:
+                landed = _loss_of_landing(c, k, flat, float(force[greatest]))
             if landed is not None:
                 loss = landed
             elif flat is not None and not edges:
@@ -215,7 +216,7 @@ def _loss_of_flat(
     It is that of a mass on two springs in series, 1 - sqrt(1 - s), but none of the force of a single wave. Drives that
     press bodies on each other, or pull those that are bonded, lose all that springs take, `in_series`.
     """
-    given, wave = contact.penalty is not None, _wave_force(c, k, contact, time)
+    given, wave = contact.penalty is not None or k in _curved(c.model), _wave_force(c, k, contact, time)
     if (speed := _driven_speed(c)) and math.isinf(wave):
         return in_series if force > WAVE[True] * _wave_force(c, k, contact, time, speed) else 0.0
     if math.isinf(force):  # of a bond that is pulled
@@ -225,30 +226,30 @@ def _loss_of_flat(
     return PEAK_LOSS * share if given and force < WEAK * wave else 0.0
 
 
-def _loss_of_landing(c: Context, k: int, force: float, depths: Sequence[Array]) -> float | None:
-    """Relative loss of the peak of contact k, of a thin body that does not yield and lands on a plane with its shadow.
-
-    At first it presses with Z v A, whatever is behind; springs that are softer than a thin wall do not come to that
-    before waves are back. None of other contacts, and where more than a wave presses.
-    """
+def _lands_flat(c: Context, k: int, depths: Sequence[Array]) -> bool:
+    """Whether contact k is that of a body that lands on a plane with all of its shadow at once."""
     own = [(item, depth) for item, depth in zip(c.model.passes, depths, strict=True) if item.contact == k]
     contact = c.scene.contacts[k]
     if not isinstance(contact, Contact) or len(own) != 1 or own[0][0].plane is None:
-        return None
+        return False
     (item, depth), normal, body = own[0], c.model.contact_axes[k, 0], contact.slave.body
-    speed, wave = c.model.V[c.nodes(body)] @ normal, _wave_force(c, k, contact, 0.0)
-    if (
-        math.isinf(wave)
-        or force > WAVE[False] * wave
-        or not depth.any()
-        or np.ptp(speed) > _ALIKE * np.abs(speed).max()
-    ):
-        return None
+    speed = c.model.V[c.nodes(body)] @ normal
+    if not depth.any() or np.ptp(speed) > _ALIKE * np.abs(speed).max():
+        return False
     pressed = item.slave[depth.reshape(len(item.slave), -1).max(axis=1) > 0.0]
     faces = item.slave_face[np.isin(item.slave_face, pressed).all(axis=1)]
-    area, height = shadow(c, body, normal), float(np.ptp(c.model.X[c.nodes(body)] @ normal))
-    landed = np.abs(face_geometry(c.model.X, faces)[1] @ normal).sum()
-    if landed < _LANDED * area or height > _THIN * math.sqrt(area):
+    return np.abs(face_geometry(c.model.X, faces)[1] @ normal).sum() >= _LANDED * shadow(c, body, normal)
+
+
+def _loss_of_landing(c: Context, k: int, contact: Contact, force: float) -> float | None:
+    """Relative loss of the peak of contact k, of a thin body that does not yield and lands flat.
+
+    At first it presses with Z v A, whatever is behind; springs that are softer than a thin wall do not come to that
+    before waves are back. None of other bodies, and where more than a wave presses.
+    """
+    normal, body = c.model.contact_axes[k, 0], contact.slave.body
+    wave, height = _wave_force(c, k, contact, 0.0), float(np.ptp(c.model.X[c.nodes(body)] @ normal))
+    if math.isinf(wave) or force > WAVE[False] * wave or height > _THIN * math.sqrt(shadow(c, body, normal)):
         return None
     return max(0.0, 1.0 - force / wave)
 

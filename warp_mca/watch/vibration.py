@@ -210,9 +210,16 @@ def impedance(c: Context, body: str) -> tuple[float, float]:
 
 
 def shadow(c: Context, body: str, normal: Array) -> float:
-    """Area of the shadow that a body casts along a unit normal [m^2]."""
-    faces = c.meshes[body].boundary[0]
-    return 0.5 * float(np.abs(face_geometry(c.model.X[c.nodes(body)], faces)[1] @ normal).sum())
+    """Area of the shadow that a body casts along a unit normal [m^2].
+
+    Of two bounds the lower one: uneven faces along the normal, as of the flank of a meshed cylinder, cast shadows too.
+    """
+    from scipy.spatial import ConvexHull
+
+    faces, X = c.meshes[body].boundary[0], c.model.X[c.nodes(body)]
+    across = np.linalg.svd(normal[None])[2][1:]  # two axes of the plane on which it falls
+    of_faces = 0.5 * float(np.abs(face_geometry(X, faces)[1] @ normal).sum())
+    return min(of_faces, float(ConvexHull(X[np.unique(faces)] @ across.T).volume))
 
 
 def _is_held(c: Finished, body: str, normal: Array) -> bool:

@@ -43,9 +43,9 @@ def _edges(face: Index, normal: Array) -> tuple[Index, Index, Array]:
 def find_sides(face: Index, normal: Array) -> Index:
     """Side of each face, shape (face_count,), int32, from 0 on; all are 0 where no edge is sharp.
 
-    Faces that share an edge are on one side, unless their normals differ by more than 50 degrees. Parts that meet at
-    such an edge get different numbers; those that do not meet may get the same, as opposite ones of a box do, so that
-    three or four numbers are enough, and never more than `MAX_SIDES`.
+    Faces that share an edge are on one side, unless their normals differ by more than 50 degrees. Parts that share a
+    node get different numbers, since all of them may press a node that a corner meets; others may get the same, as
+    opposite ones of a box do, so that three or four numbers are enough, and never more than `MAX_SIDES`.
 
     Args:
         face: corners of each face, shape (face_count, 4), int32; triangles have their last one twice.
@@ -60,11 +60,12 @@ def find_sides(face: Index, normal: Array) -> Index:
 
     smooth = np.ones(int((~sharp).sum())), (first[~sharp], second[~sharp])
     count, part = connected_components(coo_array(smooth, shape=(len(face), len(face))), directed=False)
+    at_node = np.unique(np.column_stack([face.ravel(), np.repeat(part, 4)]), axis=0)
     meets: list[set[int]] = [set() for _ in range(count)]
-    for a, b in zip(part[first[sharp]].tolist(), part[second[sharp]].tolist(), strict=True):
-        if a != b:
-            meets[a].add(b)
-            meets[b].add(a)
+    for parts in np.split(at_node[:, 1], np.flatnonzero(np.diff(at_node[:, 0])) + 1):
+        if len(parts) > 1:
+            for p in parts.tolist():
+                meets[p].update(parts.tolist())
     number = np.full(count, -1, dtype=np.int32)
     for p in np.argsort(-np.bincount(part), kind="stable"):
         taken = {int(number[q]) for q in meets[p]}
