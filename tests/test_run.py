@@ -319,7 +319,7 @@ def test_cuda_stands_for_all_gpus_of_a_sweep_and_for_the_first_elsewhere(monkeyp
     assert device.devices_named("cuda:1") == ["cuda:1"]
     assert settings_of("cuda", "mixed", 1).device == "cuda:0"
     monkeypatch.setattr(device, "all_devices", lambda: ["cpu"])
-    with pytest.raises(RequestError, match=r"device = 'cuda'.*this machine has cpu"):
+    with pytest.raises(RequestError, match=r"device = 'cuda'.*choose one of this machine: cpu"):
         settings_of("cuda", "mixed", 1)
 
 

@@ -28,7 +28,7 @@ def devices_named(name: str, known: Sequence[str] | None = None) -> list[str]:
     known = known or all_devices()
     found = [device for device in known if device == name or (name == "cuda" and device.startswith("cuda:"))]
     if not found:
-        raise bad_value("device", name, f"this machine has {', '.join(known)}")
+        raise bad_value("device", name, f"choose one of this machine: {', '.join(known)}")
     return found
 
 
