@@ -103,15 +103,11 @@ def test_a_crossing_that_begins_at_a_node_is_as_strong_as_between_nodes(one: int
     assert impulse == pytest.approx(between, abs=0.04 * np.linalg.norm(between))
 
 
-@pytest.mark.parametrize("axis", [(0.0, 1.0, 1.0), (1.0, 1.0, 1.0)], ids=["edge", "corner"])
-@pytest.mark.parametrize(  # distance from a node, speed aside
-    ("off", "aside", "most"), [(0.0, 0.0, 1e-3), (1e-7, 0.0, 5e-3), (1e-5, 0.0, 5e-3), (0.0, 0.1, 1e-2)]
-)
-@pytest.mark.parametrize("general", [False, True])
-def test_an_edge_or_a_corner_that_meets_a_node_head_on_is_not_pushed_aside(
-    axis: tuple, off: float, aside: float, most: float, general: bool
-):
-    """The node is behind two or three faces alike, each of which alone would push it along its own normal."""
+HEAD_ON = pytest.mark.parametrize("axis", [(0.0, 1.0, 1.0), (1.0, 1.0, 1.0)], ids=["edge", "corner"])
+
+
+def head_on(axis: tuple, off: float, aside: float, general: bool, **contact) -> mca.Scene:
+    """A cube that falls on another with its edge or corner, so far off a node of this and so fast aside."""
     turn, _ = Rotation.align_vectors([[0.0, -1.0, 0.0]], [axis])
     middle, velocity = (off, W * math.hypot(*axis) / 2 + 1e-7, 0.3 * off), (0.0, -3.0, aside)
     cube = mca.Box(size=(W, W, W), divisions=(4, 4, 4), origin=(-W / 2, -W / 2, -W / 2))
@@ -126,13 +122,34 @@ def test_an_edge_or_a_corner_that_meets_a_node_head_on_is_not_pushed_aside(
             velocity=velocity,
         ),
     )
-    skins = (mca.Surface(body=name, nodes="boundary") for name in ("low", "top"))
-    meet = mca.ContactAll() if general else mca.Contact(slave=next(skins), master=next(skins), two_way=True)
+    low, top = (mca.Surface(body=name, nodes="boundary") for name in ("low", "top"))
+    meet = mca.ContactAll(**contact) if general else mca.Contact(slave=low, master=top, two_way=True, **contact)
     phase = mca.ImpactPhase(duration=3e-5, output_interval=1e-6)
-    impact = finished(mca.Scene(name="head_on", bodies=bodies, contacts=(meet,), impact=phase))
+    return mca.Scene(name="head_on", bodies=bodies, contacts=(meet,), impact=phase)
+
+
+@HEAD_ON
+@pytest.mark.parametrize(  # distance from a node, speed aside
+    ("off", "aside", "most"), [(0.0, 0.0, 1e-3), (1e-7, 0.0, 5e-3), (1e-5, 0.0, 5e-3), (0.0, 0.1, 1e-2)]
+)
+@pytest.mark.parametrize("general", [False, True])
+def test_an_edge_or_a_corner_that_meets_a_node_head_on_is_not_pushed_aside(
+    axis: tuple, off: float, aside: float, most: float, general: bool
+):
+    """The node is behind two or three faces alike, each of which alone would push it along its own normal."""
+    impact = finished(head_on(axis, off, aside, general))
     pushed = momentum(impact, 0, len(impact.solver.model.X) // 2)
     assert abs(pushed[1]) > 0.3 * STEEL.rho * W**3 * 3.0
     assert math.hypot(pushed[0], pushed[2]) < most * abs(pushed[1])
+
+
+@HEAD_ON
+@pytest.mark.parametrize("general", [False, True])
+def test_a_node_that_an_edge_or_a_corner_meets_head_on_does_not_rub(axis: tuple, general: bool):
+    """It comes nearer to the edge along both faces, which is no slip."""
+    result = mca.run(head_on(axis, 1e-6, 0.0, general, mu=0.3))
+    assert result["E_friction"][-1] < 2e-3 * result["E_kinetic"][0]
+    assert result.summary["energy_error"] < 1e-3
 
 
 def test_an_edge_meets_a_rigid_bar():

@@ -236,7 +236,7 @@ def plane_kernel(
                 own = spring.stiffness[s]
             spring.stiffness[s] = own
         if gap < wp.float64(0.0):
-            force, F_n = press(s, gap, normal, du, own, own, of(mu, k), dt, spring)
+            force, F_n = press(s, gap, normal, normal, du, own, own, of(mu, k), dt, spring)
             add_normal_force(k, F_n, of(per_newton, k), normal_force_out)
             spring.face[s] = 0
             nodal_force_out[i] = nodal_force_out[i] + force

@@ -136,7 +136,7 @@ def press_kernel(friction: bool, each: bool, laws: Laws) -> Any:
             pressed, rest = gap_from_rest(s, gap, rest, spring)
             spring.rest[s] = rest
             stiffness = wp.min(k_old, factor * master.stiffness[b])
-            _, F_n = press(s, pressed, met.normal[s], met.du[s], k_old, stiffness, of(mu, k), dt, spring)
+            _, F_n = press(s, pressed, met.normal[s], met.normal[s], met.du[s], k_old, stiffness, of(mu, k), dt, spring)
             add_normal_force(k, F_n, of(per_newton, k), normal_force_out)
             spring.face[s] = b
             spring.stiffness[s] = stiffness

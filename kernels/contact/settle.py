@@ -24,6 +24,7 @@ class Touch:
         touches: whether the face presses it.
         weight: shape functions of the face at the projected point.
         du: motion of the node relative to the face [m].
+        slip: unit normal of the plane in which friction acts: that of the face, or of an edge that meets it head-on.
         held: depth before this step, as `Spring` has it [m].
         along: contact force of the last step, of any length; float32.
         own: penalty stiffness of the node [N/m].
@@ -35,6 +36,7 @@ class Touch:
     touches: wp.bool
     weight: wp.vec4d
     du: wp.vec3d
+    slip: wp.vec3d
     held: wp.float64
     along: wp.vec3f
     own: wp.float64
@@ -57,6 +59,7 @@ def meet(
     touch = Touch()
     touch.weight = weights_at(near.at, face[near.face, 2] == face[near.face, 3])
     touch.du = dt * (v[i] - master_velocity(v, face, near.face, touch.weight))
+    touch.slip = near.normal
     touch.held = held
     touch.along = along
     touch.begins = wp.float64(FAR)
@@ -115,6 +118,7 @@ def settle_functions(friction: bool, laws: Laws) -> tuple[Any, Any]:
         # a spring with neither gap nor normal has no force, and is released as an open one
         gap_kept = wp.where(touch.touches, near.gap, wp.float64(0.0))
         normal_kept = wp.where(touch.touches, near.normal, wp.vec3d())
+        slip = wp.where(touch.touches, touch.slip, wp.vec3d())
         is_open = spring.face[s] < 0
         rest = spring.rest[s]
         if touch.touches and is_open and touch.begins < wp.float64(FAR):
@@ -127,7 +131,7 @@ def settle_functions(friction: bool, laws: Laws) -> tuple[Any, Any]:
         if wp.static(laws.returns):
             returns = returns_energy(s, spring)
         if touch.touches or not returns:  # else `leave` has released it
-            force, F_n = press(s, gap_pressed, normal_kept, touch.du, k_old, stiffness, mu, touch.dt, spring)
+            force, F_n = press(s, gap_pressed, normal_kept, slip, touch.du, k_old, stiffness, mu, touch.dt, spring)
             spring.face[s] = wp.where(touch.touches, near.face, GONE)
             spring.weight[s] = touch.weight
         spring.rest[s] = rest

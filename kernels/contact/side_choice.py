@@ -194,6 +194,17 @@ def choice_functions(friction: bool, sides: int) -> tuple[Any, Any]:
         return chosen
 
     @wp.func
+    def slip_normal(at: Surfaces, e: int, near: Nearest, begin: int, spring: Spring) -> wp.vec3d:
+        """Unit normal of the plane in which a node slips on a side: midway to others that press it across an edge."""
+        total = near.normal
+        for q in range(begin, begin + wp.static(sides)):
+            if q != e and spring.face[q] >= 0:
+                across = area_vector(at.X, at.u, at.master.face, spring.face[q])
+                if is_edge(at.X, at.u, at.master.face, near.face, spring.face[q], across):
+                    total += wp.normalize(across)
+        return wp.normalize(total)
+
+    @wp.func
     def confirm(
         at: Surfaces,
         s: int,
@@ -225,6 +236,8 @@ def choice_functions(friction: bool, sides: int) -> tuple[Any, Any]:
                 even = head_on(at, s, touch.du, near.normal, choice.normal, depths, edge_of(near))
                 found.touches = even and (touches or near.front == wp.float64(FAR))
                 found.begins = wp.max(approach, wp.float64(0.0))
+        if wp.static(friction):
+            found.slip = slip_normal(at, e, near, node.begin, spring)
         return found
 
     return choose, confirm

@@ -171,6 +171,7 @@ def spring_function(friction: bool, laws: Laws) -> Any:
         s: int,
         gap: wp.float64,
         normal: wp.vec3d,
+        slip: wp.vec3d,
         du: wp.vec3d,
         k_old: wp.float64,
         k: wp.float64,
@@ -178,7 +179,10 @@ def spring_function(friction: bool, laws: Laws) -> Any:
         dt: wp.float64,
         spring: Spring,
     ):
-        """Force of a spring whose stiffness was k_old and is k [N/m], no more than that; the normal force."""
+        """Force of a spring whose stiffness was k_old and is k [N/m], no more than that; the normal force.
+
+        `slip` is the unit normal of the plane in which friction acts.
+        """
         # read everything before writing anything, so that a GPU waits for memory once
         impulse, normal_impulse, depth = spring.impulse[s], spring.normal_impulse[s], spring.depth[s]
         made_before, force_old, energy_old = spring.made[s], spring.force[s], spring.energy[s]
@@ -189,7 +193,7 @@ def spring_function(friction: bool, laws: Laws) -> Any:
         owed, spent = wp.float64(0.0), wp.float64(0.0)
         if wp.static(laws.returns):
             F, W = law_force(-gap, k_old, spring.parameters, s), law_energy(-gap, k_old, spring.parameters, s)
-            c, owed, spent = pay(s, F, W, k_old, force_old, tangential, du, normal, spring)
+            c, owed, spent = pay(s, F, W, k_old, force_old, tangential, du, normal, slip, spring)
             Fn += c
         if wp.static(damped):
             Fn, dissipated = damp(s, Fn, -gap, normal, du, k, force_old - tangential, dt, spring)
@@ -203,9 +207,9 @@ def spring_function(friction: bool, laws: Laws) -> Any:
         if wp.static(friction):
             limit = mu * Fn
             if wp.static(by_laws):
-                limit = friction_limit(mu, Fn, normal, du, dt, spring.friction_parameters, s)
+                limit = friction_limit(mu, Fn, slip, du, dt, spring.friction_parameters, s)
                 spring.limit[s] = limit
-            Ft, work, stick = stick_slip(share * tangential, du, normal, limit, k)
+            Ft, work, stick = stick_slip(share * tangential, du, slip, limit, k)
             force += Ft
             energy += half * wp.dot(Ft, Ft) / k
             spent += work

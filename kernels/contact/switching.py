@@ -60,6 +60,7 @@ def pay(
     along: wp.vec3d,
     du: wp.vec3d,
     normal: wp.vec3d,
+    slip: wp.vec3d,
     spring: Any,
 ) -> tuple[wp.float64, wp.float64, wp.float64]:
     """What spring s, which holds W and presses with F, adds to its force [N]; sets what it owes then.
@@ -68,6 +69,7 @@ def pay(
         k: its stiffness [N/m].
         before, along: its force on the node in the last step, and the part of friction [N].
         du: motion of the node relative to the face since then [m].
+        normal, slip: unit normals of the face, and of the plane in which friction acts.
 
     Returns:
         This force; what the spring owes then [J]; how much less contact has lost, because the spring begins with
@@ -86,8 +88,8 @@ def pay(
                 lost = now
             now = zero
         left = spring.normal_energy[s] + owed[0] - half * wp.dot(before - along, du) + now
-        turned = wp.dot(along, normal)  # the part that friction loses where the normal has turned
-        left += half * turned * (turned / k - out)
+        turned = wp.dot(along, slip)  # the part that friction loses where its plane has turned
+        left += half * turned * (turned / k - wp.dot(du, slip))
         if wp.abs(left) > wp.float64(wp.static(IDLE)) * W and out != zero:
             c = returning(left, out, owed[2] * F)
             left -= half * c * out
