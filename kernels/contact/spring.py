@@ -179,17 +179,13 @@ def spring_function(friction: bool, laws: Laws) -> Any:
         dt: wp.float64,
         spring: Spring,
     ):
-        """Force of a spring whose stiffness was k_old and is k [N/m], no more than that; the normal force.
-
-        `slip` is the unit normal of the plane in which friction acts.
-        """
+        """Force of a spring whose stiffness fell from k_old to k [N/m]; normal force. Friction acts across `slip`."""
         # read everything before writing anything, so that a GPU waits for memory once
         impulse, normal_impulse, depth = spring.impulse[s], spring.normal_impulse[s], spring.depth[s]
         made_before, force_old, energy_old = spring.made[s], spring.force[s], spring.energy[s]
         tangential, friction_work, stick_impulse = friction_before(s, spring)
         half = wp.float64(0.5)
-        Fn = law_force(-gap, k, spring.parameters, s)
-        stored = law_energy(-gap, k, spring.parameters, s)
+        Fn, stored = law_force(-gap, k, spring.parameters, s), law_energy(-gap, k, spring.parameters, s)
         owed, spent = wp.float64(0.0), wp.float64(0.0)
         if wp.static(laws.returns):
             F, W = law_force(-gap, k_old, spring.parameters, s), law_energy(-gap, k_old, spring.parameters, s)
