@@ -230,7 +230,7 @@ def _lands_flat(c: Context, k: int, depths: Sequence[Array]) -> bool:
     """Whether contact k is that of a body that lands on a plane with all of its shadow at once."""
     own = [(item, depth) for item, depth in zip(c.model.passes, depths, strict=True) if item.contact == k]
     contact = c.scene.contacts[k]
-    if not isinstance(contact, Contact) or len(own) != 1 or own[0][0].plane is None:
+    if not isinstance(contact, Contact) or len(own) != 1 or own[0][0].plane is None or c.model.fails:
         return False
     (item, depth), normal, body = own[0], c.model.contact_axes[k, 0], contact.slave.body
     speed = c.model.V[c.nodes(body)] @ normal
