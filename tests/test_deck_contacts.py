@@ -47,6 +47,20 @@ def test_sides_by_segments_nodes_and_boxes(tmp_path: Path):
         assert mesh.points[nodes, 2] == pytest.approx(np.full(count, height))
 
 
+def test_factors_of_friction_count_and_those_of_springs_are_told(tmp_path: Path):
+    found = scene(tmp_path, CONTACT.replace("0.001\n1\n", "0.001,50.\n,,,,,,0.5,0.1\n2\n"))
+    (contact,) = found.contacts
+    assert contact.mu == pytest.approx(0.1)
+    assert mca.ShearCap(tau_max=5e6) in contact.friction
+    notes = mca.mesh(found)["anvil"].notes
+    assert any("SOFT and SLSFAC are left out" in note for note in notes)
+
+
+def test_an_end_by_the_place_of_a_node_is_refused(tmp_path: Path):
+    with pytest.raises(mca.RequestError, match="TERMINATION_NODE"):
+        scene(tmp_path, CONTACT, more="*TERMINATION_NODE\n109,3,0.,1.\n")
+
+
 def test_a_wall_holds_the_nodes_that_it_names(tmp_path: Path):
     wall = "*RIGIDWALL_PLANAR_ID\n1,wall\n{set}\n0,0,-1,0,0,0,{friction}\n"
     found = scene(tmp_path, wall.format(set=3, friction=1.0) + wall.format(set=0, friction=0.2))

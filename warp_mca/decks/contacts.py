@@ -22,6 +22,7 @@ from warp_mca.scene.tied_surfaces import Tie
 SIDES = "ssid msid sstyp mstyp sboxid mboxid spr mpr"
 FRICTION = "fs fd dc vc vdc penchk bt dt"
 SCALES = "sfs sfm sst mst sfst sfmt fsf vsf"
+OPTIONS = "soft sofscl lcidab maxpar sbopt depth bsort frcfrq"
 SLSFAC = 0.1  # default of *CONTROL_CONTACT
 WALL = 10.0  # penalty of rigid walls, which stop nodes at once in LS-DYNA: by default, nodes of Taylor's bar sink in
 _NAMES = {0: "segments", 4: "nodes"}  # of node sets by the type of a side
@@ -60,8 +61,8 @@ class Contacts:
     def _take(self, item: Keyword) -> None:
         """One contact. Penalties, thicknesses of shells and searches are those of this program."""
         start = 1 if item.name.endswith("_ID") else 0
-        sides, friction, scales = (
-            self._content.card(item, start + k, names) for k, names in enumerate((SIDES, FRICTION, SCALES))
+        sides, friction, scales, options = (
+            self._content.card(item, start + k, names) for k, names in enumerate((SIDES, FRICTION, SCALES, OPTIONS))
         )
         name = item.name.removeprefix("CONTACT_").removesuffix("_ID")
         self._check_time(friction, "bt", "dt")
@@ -71,7 +72,7 @@ class Contacts:
             pairs = [(one, other) for other in self._sides(sides, "m") for one in slaves]
             self.ties += [(one, other) for one, other in pairs if one.body is not other.body]
             return
-        laws = self._springs(friction, scales)
+        laws = self._springs(friction, scales, options)
         if "SINGLE" in name:
             self._take_single(item, sides, laws)
             return
@@ -89,7 +90,7 @@ class Contacts:
         if card.number(birth, "time") > 0.0 or 0.0 < card.number(death, "time") < self._duration:
             raise ValueError(f"{card.place}: birth and death times are not read: let it act in the whole run")
 
-    def _springs(self, card: Card, scales: Card) -> dict[str, Any]:
+    def _springs(self, card: Card, scales: Card, options: Card) -> dict[str, Any]:
         """Coefficient and laws of friction."""
         mu, kinetic, decay = card.number("fs"), card.number("fd"), card.number("dc", "slowness")
         factor = scales.number("fsf", default=1.0) or 1.0
@@ -99,10 +100,10 @@ class Contacts:
         if decay and kinetic != mu:
             laws.append(DecayingFriction(kinetic=factor * kinetic, decay=decay))
         if mu and (cap := card.number("vc", "stress")):
-            laws.append(ShearCap(tau_max=cap))
+            laws.append(ShearCap(tau_max=cap * (scales.number("vsf", default=1.0) or 1.0)))
         own = [scales.number(name, default=1.0) or 1.0 for name in ("sfs", "sfm")]
-        if own != [1.0, 1.0] or card.number("vdc") or self._scale != SLSFAC:
-            what = "SFS, SFM, VDC and SLSFAC are left out: springs of contact are those of this program"
+        if own != [1.0, 1.0] or card.number("vdc") or options.number("soft") or self._scale != SLSFAC:
+            what = "SFS, SFM, VDC, SOFT and SLSFAC are left out: springs of contact are those of this program"
             self._content.notes.append(f"{card.place}: {what}")
         return {"mu": factor * mu, "friction": tuple(laws)}
 

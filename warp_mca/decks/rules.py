@@ -50,7 +50,7 @@ HARMLESS = (
     *("DATABASE_*", "CONTROL_OUTPUT", "CONTROL_ENERGY", "CONTROL_SHELL"),
     *("CONTROL_CPU", "CONTROL_PARALLEL", "CONTROL_MPP_*", "CONTROL_CHECK*", "CONTROL_STRUCTURED*", "CONTROL_UNITS"),
     *("CONTACT_FORCE_TRANSDUCER*", "SET_SHELL*", "SET_BEAM*", "SET_SOLID*", "SET_DISCRETE*", "DEFINE_BOX_ADAPTIVE"),
-    *("SECTION_SHELL*", "SECTION_BEAM*", "SECTION_DISCRETE*", "TERMINATION_NODE*"),
+    *("SECTION_SHELL*", "SECTION_BEAM*", "SECTION_DISCRETE*"),
     *("SENSOR_DEFINE*", "SENSOR_SWITCH*"),  # *SENSOR_CONTROL alone acts on them: it switches contacts and supports
 )
 # Settings of numerics, for which the elements, contacts and time steps of this program have their own.
