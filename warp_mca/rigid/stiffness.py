@@ -69,7 +69,8 @@ def inverse(K: sparse.bsr_array) -> tuple[Callable[[Array], Array], bool] | None
     diagonal = K.diagonal().reshape(-1, 3)
     stiff = diagonal > 0.0
     felt = K.data.any(axis=(1, 2))
-    rows, columns, blocks = _rows(K)[felt], K.indices[felt], K.data[felt]
+    rows, columns = _rows(K)[felt], K.indices[felt]
+    blocks: Array = np.asarray(K.data[felt], dtype=np.float64)
     nodes = sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(len(stiff),) * 2)
     pieces = connected_components(nodes, directed=False)[1]
     factors, rough, exact = [], stiff.copy(), True
@@ -81,8 +82,8 @@ def inverse(K: sparse.bsr_array) -> tuple[Callable[[Array], Array], bool] | None
         lower = np.flatnonzero((rank[columns] >= 0) & (rank[rows] >= rank[columns]))
         i, j = rank[rows[lower]], rank[columns[lower]]
         if float(3 * (i - j).max() + 3) ** 2 * stiff[mine].size <= MOST_WORK:
-            band = _band(i, j, blocks[lower], stiff[order].ravel())
-            found = next(filter(None, (_factors(band, shift) for shift in SHIFTS)), None)
+            piece = i, j, blocks[lower], stiff[order].ravel()
+            found = next(filter(None, (_factors(_band(*piece), shift) for shift in SHIFTS)), None)
             if found is None:
                 return None
             factors.append((order, found[0]))
@@ -99,12 +100,14 @@ def inverse(K: sparse.bsr_array) -> tuple[Callable[[Array], Array], bool] | None
 
 
 def _factors(band: Array, shift: float) -> tuple[Array, float] | None:
-    """Those of a matrix of these diagonals, to whose main one that share of its median is added, and the shift."""
-    shifted = band.copy()
-    shifted[0] += shift * np.median(band[0])
+    """Those of a matrix of these diagonals, to whose main one that share of its median is added, and the shift.
+
+    They take the place of the diagonals.
+    """
+    band[0] += shift * np.median(band[0])
     try:
         with one_blas_thread():
-            return cholesky_banded(shifted, overwrite_ab=True, lower=True), shift
+            return cholesky_banded(band, overwrite_ab=True, lower=True), shift
     except LinAlgError:
         return None
 
