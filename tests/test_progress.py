@@ -66,7 +66,7 @@ def test_the_forecast_tells_groups_and_batches():
 
 @pytest.mark.parametrize("contact", ["general", "listed"])
 def test_a_step_takes_as_long_as_forecast(contact: str, monkeypatch: pytest.MonkeyPatch):
-    """Blocks of few layers, whose contact takes longer than their elements, by processor time: others work here, too."""
+    """Blocks of few layers, whose contact takes longer than their elements, by processor time: others work too."""
     monkeypatch.setattr(time, "perf_counter", time.process_time)
     geometry = mca.Box(size=(0.02, 0.02, 0.01), divisions=(12, 12, 2))
     blocks = [
