@@ -14,6 +14,7 @@ from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring, pressure_fun
 from warp_mca.kernels.contact.way_back import OPPOSES, WayBack, head_on, way_back_function
 
 _ROUNDING = 1e-6  # a node penetrates a side beyond this depth, as a fraction of an edge
+_BEHIND = 0.01  # depth that a node has more in a side than it can have reached, where it meets their edge head-on
 
 
 @wp.struct
@@ -234,7 +235,8 @@ def choice_functions(friction: bool, sides: int) -> tuple[Any, Any]:
             if is_edge(at.X, at.u, at.master.face, near.face, choice.face, choice.normal):
                 depths = -near.gap - approach - choice.depth
                 even = head_on(at, s, touch.du, near.normal, choice.normal, depths, edge_of(near))
-                found.touches = even and (touches or near.front == wp.float64(FAR))
+                inside = near.front == wp.float64(FAR) and wp.abs(depths) <= wp.float64(_BEHIND) * edge_of(near)
+                found.touches = even and (touches or inside)
                 found.begins = wp.max(approach, wp.float64(0.0))
         if wp.static(friction):
             found.slip = slip_normal(at, e, near, node.begin, spring)
