@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 STEPS = 10  # between two looks at the kinetic energy at most, until it was at its greatest
 SHORT = 0.7  # share of that between every second two: looks half a period apart would always see a motion turn back
 LOOKS = 8  # at least until then, and in each quarter of the period of what moves later
-LENGTHS = (1, 2, 5, STEPS)  # of what is advanced at once within a part: each other number has a graph of launches
+LENGTHS = (1, 2, 5, STEPS)  # of what is advanced at once: a graph of launches is captured for each other number
 ROWS = 500  # of the history, where it lasts as long as it may
 
 
@@ -70,7 +70,7 @@ def settle(phase: Settle, impact: Impact, tell: Callable[[float], None]) -> Stre
         wanted = max(1, min(STEPS, state.steps // LOOKS), quarter // LOOKS)
         wanted, short = max(1, int(SHORT * wanted)) if short else wanted, not short
         stride = min(wanted, steps.count - STEPS - state.steps)
-        stride = _advance(impact, stride)
+        _advance(impact, stride)
         tell(state.steps / steps.count)
         kinetic = motion.look()
         if kinetic > greatest:
@@ -96,15 +96,8 @@ def _return_energy(impact: Impact, on: bool) -> None:
             return_energy(stage, own.spring, on)
 
 
-def _advance(impact: Impact, stride: int) -> int:
-    """Take so many steps, or fewer that end with a part of an interval, and say how many."""
-    steps, begin = impact.steps, impact.state.steps
-    size, end = min(steps.per_search, steps.per_check), begin + stride
-    whole = end - end % steps.per_search % size
-    end = whole if whole > begin else end
-    while (now := impact.state.steps) < end:
-        done = now % steps.per_search
-        left = min(end - now, size - done % size, steps.per_search - done)
-        starts_part = done % size == 0 and end == whole
-        impact.advance(until=end if starts_part else now + max(length for length in LENGTHS if length <= left))
-    return end - begin
+def _advance(impact: Impact, stride: int) -> None:
+    """Take so many steps."""
+    end = impact.state.steps + stride
+    while (left := end - impact.state.steps) > 0:
+        impact.advance(until=impact.state.steps + max(length for length in LENGTHS if length <= left))
