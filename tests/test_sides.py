@@ -8,7 +8,7 @@ from impacts import begun, finished, momentum, result_of
 from sharp_edges import HARD, SOFT, STEEL, H, bars, frame, in_frame, roof
 
 import warp_mca as mca
-from warp_mca.physics.contact.sides import MAX_SIDES, face_geometry, find_sides, stiffest_fold
+from warp_mca.physics.contact.sides import MAX_SIDES, face_geometry, find_sides, stiffest_edge
 
 
 def sides(mesh: mca.Mesh, nodes: str = "boundary") -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -54,22 +54,21 @@ def test_sides_that_meet_in_a_point_alone_differ():
     assert len(set(find_sides(face, face_geometry(X, face)[1]))) == 4
 
 
-@pytest.mark.parametrize(("kind", "expected"), [("L", 1.0), ("U", 1.0)])
-def test_springs_of_a_right_fold_add_no_stiffness(kind: str, expected: float):
+@pytest.mark.parametrize("kind", ["L", "U"])
+def test_springs_of_a_right_fold_add_no_stiffness(kind: str):
     mesh = frame(kind)
     face, _ = mesh.surface("every")
-    normal = face_geometry(mesh.points, face)[1]
-    assert stiffest_fold(face, normal, mesh.points[face].mean(axis=1)) == pytest.approx(expected)
+    assert stiffest_edge(face, face_geometry(mesh.points, face)[1]) == pytest.approx(1.0)
 
 
-def test_springs_of_a_narrow_groove_add_up():
-    """Walls at 30 degrees to each other face each other nearly; across its upper edges solids stand, no fold."""
-    X = np.array([[x, y, z] for z in (0.0, 1.0) for x, y in ((-2, 2), (-np.tan(np.radians(15.0)) * 2, 2), (0, 0))])
-    X = np.concatenate([X, X[[1, 4]] * [-1.0, 1.0, 1.0]])
-    face = np.array([[0, 3, 4, 1], [1, 4, 5, 2], [2, 5, 7, 6]], np.int32)
-    normal = face_geometry(X, face)[1]
-    assert (normal[0] / np.linalg.norm(normal[0])).tolist() == [0.0, 1.0, 0.0]
-    assert stiffest_fold(face, normal, X[face].mean(axis=1)) == pytest.approx(1.0 + np.cos(np.radians(30.0)))
+@pytest.mark.parametrize("opening", [30.0, 330.0])
+def test_springs_of_both_sides_of_an_edge_add_up(opening: float):
+    """In a groove with walls at 30 degrees, and at the edge of a blade of 30 degrees, which a node meets head-on."""
+    half = np.radians(0.5 * opening)
+    X = np.array([(s * np.sin(half), np.cos(half), z) for z in (0.0, 1.0) for s in (-1.0, 0.0, 1.0)])
+    X[[1, 4], :2] = 0.0
+    face = np.array([[0, 3, 4, 1], [1, 4, 5, 2]], np.int32)
+    assert stiffest_edge(face, face_geometry(X, face)[1]) == pytest.approx(1.0 + np.cos(np.radians(30.0)))
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ with the elongation r at which the springs store no energy: what they store, and
 
 import warp as wp
 
-from warp_mca.kernels.nodes.spring import Springs, between_ends, direction_of, table_at
+from warp_mca.kernels.nodes.spring import Springs, direction_of, ends_of, table_at
 
 GROUPS = wp.vec2d(3.0, 6.0)  # straight and slanted springs of a bolt
 
@@ -62,42 +62,50 @@ def force_at(j: int, springs: Springs, P: wp.float64, e: wp.float64) -> wp.float
 
 
 @wp.kernel(enable_backward=False)
+def stretch_bolts(
+    springs: Springs, tightens: wp.array(dtype=wp.int32), u: wp.array(dtype=wp.vec3d), L_out: wp.array(dtype=wp.float64)
+):
+    """Find the length of each spring [m] while bolts are tightened, a block of threads for each."""
+    j, lane = wp.tid()
+    if tightens[0] > 0:
+        L = wp.length(springs.between[j] + ends_of(j, lane, springs, u))
+        if lane == 0:
+            L_out[j] = L
+
+
+@wp.kernel(enable_backward=False)
 def tighten_bolts(
     springs: Springs,
     shanks: Shanks,
     elongation: wp.array(dtype=wp.float64),
-    X: wp.array(dtype=wp.vec3d),
-    u: wp.array(dtype=wp.vec3d),
+    L: wp.array(dtype=wp.float64),
     dt: wp.float64,
     state_out: ShankState,
 ):
-    """Let L_0 follow mean elongations, and the preload grow, a block of threads for each bolt; at the start dt is 0.
+    """Let L_0 follow mean elongations, and the preload grow, a thread for each bolt; at the start dt is 0.
 
-    `elongation` is e of each spring a step before [m], shape (spring_count,).
+    `elongation` is e of each spring a step before [m], `L` its length [m], shape (spring_count,).
     """
-    b, lane = wp.tid()
+    b = wp.tid()
     if shanks.tightens[0] > 0:
         mean = wp.vec2d()
         for j in range(shanks.begin[b], shanks.begin[b + 1]):
             k = shanks.slanted[j]
-            mean[k] += (wp.length(between_ends(j, lane, springs, X, u)) - shanks.length[j]) / wp.static(GROUPS)[k]
+            mean[k] += (L[j] - shanks.length[j]) / wp.static(GROUPS)[k]
         turned = state_out.turned[b] + dt
         s = wp.min(turned / shanks.rise[b], wp.float64(1.0))
         grown = s * s * (wp.float64(3.0) - wp.float64(2.0) * s)
         for j in range(shanks.begin[b], shanks.begin[b + 1]):
-            L = wp.length(between_ends(j, lane, springs, X, u))
-            if lane == 0:
-                before = state_out.preload[j]
-                P = grown * shanks.preload[j]
-                L_0 = shanks.length[j] + mean[shanks.slanted[j]]
-                e = L - L_0
-                T = wp.float64(0.5) * (force_at(j, springs, before, elongation[j]) + force_at(j, springs, P, e))
-                work = (P - before) * (wp.float64(0.5) * (e + elongation[j]) - springs.rest[j])
-                state_out.work[j] = state_out.work[j] + work - T * (L_0 - state_out.length[j])
-                state_out.length[j] = L_0
-                state_out.preload[j] = P
-        if lane == 0:
-            state_out.turned[b] = turned
+            before = state_out.preload[j]
+            P = grown * shanks.preload[j]
+            L_0 = shanks.length[j] + mean[shanks.slanted[j]]
+            e = L[j] - L_0
+            T = wp.float64(0.5) * (force_at(j, springs, before, elongation[j]) + force_at(j, springs, P, e))
+            work = (P - before) * (wp.float64(0.5) * (e + elongation[j]) - springs.rest[j])
+            state_out.work[j] = state_out.work[j] + work - T * (L_0 - state_out.length[j])
+            state_out.length[j] = L_0
+            state_out.preload[j] = P
+        state_out.turned[b] = turned
 
 
 @wp.kernel(enable_backward=False)
@@ -105,7 +113,6 @@ def read_bolts(
     begin: wp.array(dtype=wp.int32),
     springs: Springs,
     tension: wp.array(dtype=wp.float64),
-    X: wp.array(dtype=wp.vec3d),
     u: wp.array(dtype=wp.vec3d),
     axial_out: wp.array(dtype=wp.float64),
     shear_out: wp.array(dtype=wp.float64),
@@ -115,7 +122,7 @@ def read_bolts(
     force = wp.vec3d()
     axis = wp.vec3d()
     for j in range(begin[b], begin[b + 1]):
-        n = direction_of(j, springs, between_ends(j, lane, springs, X, u), wp.float64(0.0))
+        n = direction_of(j, springs, springs.between[j] + ends_of(j, lane, springs, u), wp.float64(0.0))
         force += tension[j] * n
         axis += n
     if lane == 0:

@@ -5,6 +5,8 @@ first point to the second one, and the length L between them, the tension is
 
     T = T_s(L - L_0) + T_d(dL/dt),   w T n on the nodes of the first point, -w T n on those of the second.
 
+A block of threads finds the force T n of a spring; then a thread for each node adds those of the springs at it.
+
 T_s and T_d are piecewise linear, beyond their ends with the slope there. At t(n) the speed s is known half a step
 before; what T itself adds until t(n) counts, by the lightness l of both points (1/m of a mass), and what all else adds
 to it, as it was a step before:
@@ -17,7 +19,7 @@ w and dashpots of a rate of decay b = T_d' l in all, stability asks for w^2 dt^2
 
 import warp as wp
 
-from warp_mca.kernels.hardware.block import block_sum, wait_for_block
+from warp_mca.kernels.hardware.block import block_sum
 
 LEAST = 1e-12  # share of the length at the start below which the direction is not known
 
@@ -27,11 +29,11 @@ class Springs:
     """The springs of a model.
 
     Attributes:
-        begin: first entry in `node` of the first and the second point of each, and the number of all, shape (2
-            spring_count + 1,), int32; a second point without nodes stays in place.
-        node: shape (entry_count,), int32.
-        weight: w of each [-], shape (entry_count,), float64.
-        ground: place of second points without nodes [m], shape (spring_count,), vec3d.
+        begin: first entry in `node` of each, and the number of all, shape (spring_count + 1,), int32.
+        node: those of both points, shape (entry_count,), int32; a second point without nodes stays in place.
+        weight: w of each, -w in the first point [-], shape (entry_count,), float64.
+        between: way from the first to the second point in the reference configuration [m], shape (spring_count,),
+            vec3d.
         direction: n where it stays as it is, else zero [-], shape (spring_count,), vec3d.
         rest: elongation at which no energy is stored [m], shape (spring_count,), float64.
         lowest: integral of T_s there [J], shape (spring_count,), float64.
@@ -45,7 +47,7 @@ class Springs:
     begin: wp.array(dtype=wp.int32)
     node: wp.array(dtype=wp.int32)
     weight: wp.array(dtype=wp.float64)
-    ground: wp.array(dtype=wp.vec3d)
+    between: wp.array(dtype=wp.vec3d)
     direction: wp.array(dtype=wp.vec3d)
     rest: wp.array(dtype=wp.float64)
     lowest: wp.array(dtype=wp.float64)
@@ -53,6 +55,23 @@ class Springs:
     tables: wp.array(dtype=wp.int32)
     x: wp.array(dtype=wp.float64)
     y: wp.array(dtype=wp.float64)
+
+
+@wp.struct
+class Ends:
+    """The springs at each node that has some.
+
+    Attributes:
+        node: shape (node_count,), int32.
+        begin: first entry in `spring` of each, and the number of all, shape (node_count + 1,), int32.
+        spring: shape (entry_count,), int32.
+        weight: as in `Springs` [-], shape (entry_count,), float64.
+    """
+
+    node: wp.array(dtype=wp.int32)
+    begin: wp.array(dtype=wp.int32)
+    spring: wp.array(dtype=wp.int32)
+    weight: wp.array(dtype=wp.float64)
 
 
 @wp.struct
@@ -95,18 +114,13 @@ def table_at(begin: int, end: int, x: wp.array(dtype=wp.float64), y: wp.array(dt
 
 @wp.func
 def ends_of(j: int, lane: int, springs: Springs, values: wp.array(dtype=wp.vec3d)):
-    """Values of nodes at the second point of spring j, if it has nodes, less those at the first one.
+    """Value of nodes at the second point of spring j, if it has nodes, less that at the first one.
 
     All threads of the block call this and get it.
     """
     found = wp.vec3d()
-    begin = springs.begin[2 * j]
-    middle = springs.begin[2 * j + 1]
-    for e in range(begin + lane, springs.begin[2 * j + 2], wp.block_dim()):
-        value = springs.weight[e] * values[springs.node[e]]
-        if e < middle:
-            value = -value
-        found += value
+    for e in range(springs.begin[j] + lane, springs.begin[j + 1], wp.block_dim()):
+        found += springs.weight[e] * values[springs.node[e]]
     return block_sum(found)
 
 
@@ -122,15 +136,6 @@ def count_taken(j: int, damper: wp.vec3d, speed: wp.vec3d, dt: wp.float64, state
 
 
 @wp.func
-def between_ends(j: int, lane: int, springs: Springs, X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d)):
-    """Way from the first to the second point of spring j [m]; all threads of the block get it."""
-    way = ends_of(j, lane, springs, X) + ends_of(j, lane, springs, u)
-    if springs.begin[2 * j + 2] == springs.begin[2 * j + 1]:
-        way += springs.ground[j]
-    return way
-
-
-@wp.func
 def direction_of(j: int, springs: Springs, between: wp.vec3d, length: wp.float64) -> wp.vec3d:
     """Along which spring j acts: n."""
     n = springs.direction[j]
@@ -141,30 +146,25 @@ def direction_of(j: int, springs: Springs, between: wp.vec3d, length: wp.float64
 
 @wp.kernel(enable_backward=False)
 def pull_springs(
-    first: wp.array(dtype=wp.int32),
     springs: Springs,
     length: wp.array(dtype=wp.float64),
     preload: wp.array(dtype=wp.float64),
-    X: wp.array(dtype=wp.vec3d),
     u: wp.array(dtype=wp.vec3d),
     v: wp.array(dtype=wp.vec3d),
     dt: wp.float64,
     keeps: bool,
-    nodal_force_out: wp.array(dtype=wp.vec3d),
+    force_out: wp.array(dtype=wp.vec3d),
     state_out: SpringState,
 ):
-    """Add the forces of springs; a block of threads takes the springs of a scene in turn, which may share nodes.
+    """Find the force T n of each spring [N], a block of threads for each.
 
     `length` is L_0 [m] of each, `preload` its tension there beside that of the table [N]. With `keeps`, their state at
     t(n) is kept: energy, what dashpots took, tension and elongation.
     """
-    scene, lane = wp.tid()
-    for j in range(first[scene], first[scene + 1]):
-        begin = springs.begin[2 * j]
-        middle = springs.begin[2 * j + 1]
-        end = springs.begin[2 * j + 2]
-        between = between_ends(j, lane, springs, X, u)
-        speed = ends_of(j, lane, springs, v)
+    j, lane = wp.tid()
+    between = springs.between[j] + ends_of(j, lane, springs, u)
+    speed = ends_of(j, lane, springs, v)
+    if lane == 0:
         n = direction_of(j, springs, between, length[j])
         e = wp.dot(n, between) - length[j]
         stiff = table_at(springs.tables[2 * j], springs.tables[2 * j + 1], springs.x, springs.y, e)
@@ -177,16 +177,19 @@ def pull_springs(
                 given = wp.dot(n, speed - state_out.speed[j]) / dt
                 T += half * (given + springs.lightness[j] * state_out.tension[j])
             T /= wp.float64(1.0) + half * springs.lightness[j]
-        for k in range(begin + lane, middle, wp.block_dim()):
-            i = springs.node[k]
-            nodal_force_out[i] = nodal_force_out[i] + springs.weight[k] * T * n
-        wait_for_block()  # points may share nodes
-        for k in range(middle + lane, end, wp.block_dim()):
-            i = springs.node[k]
-            nodal_force_out[i] = nodal_force_out[i] - springs.weight[k] * T * n
-        if keeps and lane == 0:
             state_out.energy[j] = preload[j] * (e - springs.rest[j]) + stiff[2] - springs.lowest[j]
             state_out.tension[j] = T
             state_out.elongation[j] = e
             count_taken(j, (T - spring) * n, speed, dt, state_out)
-        wait_for_block()  # the next spring may share nodes with this one
+        force_out[j] = T * n
+
+
+@wp.kernel(enable_backward=False)
+def add_pulls(ends: Ends, force: wp.array(dtype=wp.vec3d), nodal_force_out: wp.array(dtype=wp.vec3d)):
+    """Add the forces of springs [N] to their nodes, a thread for each."""
+    k = wp.tid()
+    i = ends.node[k]
+    added = nodal_force_out[i]
+    for e in range(ends.begin[k], ends.begin[k + 1]):
+        added -= ends.weight[e] * force[ends.spring[e]]
+    nodal_force_out[i] = added

@@ -83,13 +83,13 @@ def is_curved(face: Index, normal: Array) -> bool:
     return bool(((cosine >= SHARP) & (cosine < BENT)).any())
 
 
-def stiffest_fold(face: Index, normal: Array, middle: Array) -> float:
-    """How many times stiffer than one spring the two that press a node in a fold are together: 1 + |n1 . n2|, at most.
+def stiffest_edge(face: Index, normal: Array) -> float:
+    """How many times stiffer than one spring the two that press a node at once are together: 1 + |n1 . n2|, at most.
+
+    Both sides of a sharp edge press a node in a fold, and one that meets the edge of a solid head-on.
 
     Args:
         face, normal: as of `find_sides`.
-        middle: mean of the corners of each face [m], shape (face_count, 3).
     """
-    first, second, cosine = _edges(face, normal)
-    fold = (cosine < SHARP) & (((middle[second] - middle[first]) * normal[first]).sum(axis=1) > 0.0)
-    return 1.0 + float(np.abs(cosine[fold]).max(initial=0.0))
+    _, _, cosine = _edges(face, normal)
+    return 1.0 + float(np.abs(cosine[cosine < SHARP]).max(initial=0.0))

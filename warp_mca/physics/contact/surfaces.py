@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from warp_mca.geometry.cell_types import is_triangle
 from warp_mca.physics.contact.friction_laws import friction_values
-from warp_mca.physics.contact.sides import face_geometry, find_sides, is_curved, stiffest_fold
+from warp_mca.physics.contact.sides import face_geometry, find_sides, is_curved, stiffest_edge
 from warp_mca.physics.contact.stiffness import flat_modulus, is_flat, node_mean, spring_stiffness
 from warp_mca.scene import Contact, ContactAll, RigidPlane, Surface
 from warp_mca.scene.contact_laws import law_values
@@ -117,7 +117,7 @@ def surface_pass(
         contact=index,
         face=master.node,
         side=side,
-        at_once=stiffest_fold(master.node, master.normal, master.middle) if side.any() else 1.0,
+        at_once=stiffest_edge(master.node, master.normal),
         master=masters,
         face_offset=offset,
         face_of_node=around,

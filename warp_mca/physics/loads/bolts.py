@@ -26,7 +26,7 @@ from warp_mca.base.errors import bad_value
 from warp_mca.base.joining import AS_IS, ITEMS, joinable
 from warp_mca.base.rotation import rotation_matrix
 from warp_mca.physics.loads.bolts_stage import BoltsStage as Stage
-from warp_mca.physics.loads.springs import WHOLE, SpringNodes, lightness
+from warp_mca.physics.loads.springs import WHOLE, SpringNodes, lightness, signed
 from warp_mca.scene.bodies import Vec3
 from warp_mca.scene.bolts import Bolt
 from warp_mca.system.bodies import Bodies
@@ -178,26 +178,25 @@ def _cells_around(assembly: Bodies, body: str, place: Array) -> Index:
 
 def _bar(assembly: Bodies, load: Bolt, own: Truss, ends: list[End], i: int, j: int) -> SpringNodes:
     """The spring from corner i of the first end to corner j of the second one."""
-    node = np.concatenate([ends[0][0], ends[1][0]])
-    weights = [ends[0][1][i], ends[1][1][j]]
-    between = weights[1] @ assembly.X[ends[1][0]] - weights[0] @ assembly.X[ends[0][0]]
+    bodies, held = (load.body, load.other), [(own, share[k]) for (own, share), k in zip(ends, (i, j), strict=True)]
+    node, weight = signed(held)
+    between = weight @ assembly.X[node]
     length = float(np.linalg.norm(between))
     k, pull = (own.straight, load.preload / 3.0) if i == j else (own.slanted, 0.0)
     light, added = 0.0, []
-    for body, (nodes, _), weight in zip((load.body, load.other), ends, weights, strict=True):
-        light += lightness(assembly, body, nodes, weight, between / length)
-    for body, (nodes, _) in zip((load.body, load.other), ends, strict=True):
+    for body, end in zip(bodies, held, strict=True):
+        light += lightness(assembly, body, *end, between / length)
+    for body, (nodes, _) in zip(bodies, held, strict=True):
         added.append(np.full(len(nodes), (WHOLE if assembly.scene.body(body).rigid else 1.0) * k * light))
     # the preload stores F^2 / (2 k_a) in all of them
     rest = -0.5 * load.preload / own.axial
     return SpringNodes(
-        node=node.astype(np.int32),
-        middle=len(ends[0][0]),
-        weight=np.concatenate(weights),
+        node=node,
+        weight=weight,
         added=np.concatenate(added),
         decay=np.zeros(len(node)),
         lightness=light,
-        ground=np.zeros(3),
+        between=between,
         direction=np.zeros(3),
         length=length,
         preload=pull,

@@ -44,6 +44,7 @@ class BoltsStage(SpringsStage):
         super().__init__(solver, name)
         bolts, own = self.items, bolt.Shanks()
         self.axial, self.shear = (wp.zeros(len(bolts), dtype=wp.float64) for _ in range(2))
+        self.L = wp.zeros(self.count, dtype=wp.float64)
         own.begin = wp.array(offsets([len(item.bars) for item in bolts]), dtype=wp.int32)
         own.length, own.preload = self.length, self.preload
         own.slanted = wp.array(np.concatenate([item.slanted for item in bolts]), dtype=wp.int32)
@@ -66,16 +67,17 @@ class BoltsStage(SpringsStage):
 
     def record_kernels(self) -> list[Any]:
         """Those of a step, which have blocks of Warp's own size."""
-        return [*super().record_kernels(), bolt.tighten_bolts, bolt.read_bolts]
+        return [*super().record_kernels(), bolt.stretch_bolts, bolt.tighten_bolts, bolt.read_bolts]
 
     def push(self, step: Step, start: bool = False) -> None:
         """Add the forces of all bolts, which may be tightened."""
         state, kept = step.state.parts[self.name], bolt.ShankState()
         for key in ("length", "preload", "turned", "work"):
             setattr(kept, key, getattr(state, key))
-        dt = 0.0 if start else self.dt
-        inputs = [self.springs, self.shanks, state.elongation, self.work.X, step.state.u, dt]
-        wp.launch(bolt.tighten_bolts, (len(self.items), self.lanes), inputs=inputs, outputs=[kept], block_dim=BLOCK)
+        inputs = [self.springs, self.shanks.tightens, step.state.u]
+        wp.launch(bolt.stretch_bolts, (self.count, self.lanes), inputs=inputs, outputs=[self.L], block_dim=BLOCK)
+        inputs = [self.springs, self.shanks, state.elongation, self.L, 0.0 if start else self.dt]
+        wp.launch(bolt.tighten_bolts, len(self.items), inputs=inputs, outputs=[kept])
         self.pull(step, start, state.length, state.preload)
 
     def energies_of(self, state: State) -> Sequence[wp.array]:
@@ -85,7 +87,7 @@ class BoltsStage(SpringsStage):
 
     def readings_of(self, state: State) -> Sequence[wp.array]:
         """Axial and shear force."""
-        inputs = [self.shanks.begin, self.springs, state.parts[self.name].tension, self.work.X, state.u]
+        inputs = [self.shanks.begin, self.springs, state.parts[self.name].tension, state.u]
         outputs = [self.axial, self.shear]
         threads = (len(self.items), self.lanes)
         wp.launch(bolt.read_bolts, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -32,12 +33,11 @@ class SpringNodes(LoadedNodes):
     """A spring; `node` are those of its first point, then those of the second one.
 
     Attributes:
-        middle: how many nodes the first point has.
-        weight: of each node in its point [-], shape (count,), float64.
+        weight: of each node in its point, negative in the first one [-], shape (count,), float64.
         added: eigenvalue at each node [1/s^2], shape (count,), float64.
         decay: rate at which the dashpot decays, at each node [1/s], shape (count,), float64.
         lightness: of both points along the spring [1/kg].
-        ground: place of a second point without nodes [m], shape (3,), float64.
+        between: way from the first to the second point at the start [m], shape (3,), float64.
         direction: along which it acts [-], shape (3,), float64; zero for the line between the points.
         length: without tension [m].
         preload: tension at that length [N].
@@ -46,12 +46,11 @@ class SpringNodes(LoadedNodes):
         table, damper: of tension over elongation [m], [N], and over its speed [m/s], [N], shape (2, count), float64.
     """
 
-    middle: int = field(metadata=AS_IS)
     weight: Array = field(metadata=AS_IS)
     added: Array = field(metadata=AS_IS)
     decay: Array = field(metadata=AS_IS)
     lightness: float = field(metadata=AS_IS)
-    ground: Array = field(metadata=AS_IS)
+    between: Array = field(metadata=AS_IS)
     direction: Array = field(metadata=AS_IS)
     length: float = field(metadata=AS_IS)
     preload: float = field(metadata=AS_IS)
@@ -86,8 +85,9 @@ def build(load: Spring, assembly: Bodies) -> SpringNodes:
     if load.other is not None:
         ends.append(_point(assembly, load, "other", load.other, load.other_at, load.other_nodes))
     places = [weight @ assembly.X[node] for node, weight in ends]
-    ground = np.array(places[0] if load.other_at is None else load.other_at, dtype=np.float64)
-    between = (places[1] if len(places) > 1 else ground) - places[0]
+    if load.other is None:
+        places.append(places[0] if load.other_at is None else np.array(load.other_at, dtype=np.float64))
+    between = places[1] - places[0]
     direction, n, length = np.zeros(3), np.zeros(3), float(np.linalg.norm(between))
     if load.direction is not None:
         n = np.array(load.direction) / np.linalg.norm(load.direction)
@@ -100,7 +100,7 @@ def build(load: Spring, assembly: Bodies) -> SpringNodes:
     k, c = (_steepest(np.array(table)) for table in (load.table, load.damper))
     bodies = [load.body, *([] if load.other is None else [load.other])]
     own = [lightness(assembly, body, *end, n) for body, end in zip(bodies, ends, strict=True)]
-    node, weight = (np.concatenate(parts) for parts in zip(*ends, strict=True))
+    node, weight = signed(ends)
     table = np.array(load.table, dtype=np.float64)
     rest = _rest(table, load.preload)
     added, decay = [], []
@@ -110,14 +110,13 @@ def build(load: Spring, assembly: Bodies) -> SpringNodes:
         added.append(whole if rigid else np.full(len(nodes), k * sum(own)))
         decay.append(np.full(len(nodes), (BRAKED if rigid else LAGGED) * c * sum(own)))
     return SpringNodes(
-        node=node.astype(np.int32),
+        node=node,
         name=load.name,
-        middle=len(ends[0][0]),
         weight=weight,
         added=np.concatenate(added),
         decay=np.concatenate(decay),
         lightness=sum(own),
-        ground=ground,
+        between=between,
         direction=direction,
         length=length if load.length is None else load.length,
         preload=load.preload,
@@ -141,6 +140,12 @@ def _point(
         node, weight = weighted_set(mesh.nodes(nodes), assembly.mass[assembly.all_nodes(body)])
     own, which = np.unique(node, return_inverse=True)  # corners of wedges coincide
     return own + first, np.bincount(which, weight).astype(np.float64)
+
+
+def signed(ends: Sequence[tuple[Index, Array]]) -> tuple[Index, Array]:
+    """Nodes of both points, or of the first one, and their weights, negative in the first one."""
+    node = np.concatenate([nodes for nodes, _ in ends]).astype(np.int32)
+    return node, np.concatenate([-ends[0][1], *(weight for _, weight in ends[1:])])
 
 
 def lightness(assembly: Bodies, body: str, node: Index, weight: Array, n: Array) -> float:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
-from warp_mca.base.arrays import Array
+from warp_mca.base.arrays import Array, Index
 from warp_mca.base.joining import offsets
 from warp_mca.kernels.nodes import spring
 from warp_mca.physics.loads.nodal_stage import NodalLoad
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from warp_mca.system.actor import System
     from warp_mca.system.state import State
 
-BLOCK = 256  # threads of a GPU for the springs of a scene
+BLOCK = 256  # threads of a GPU for a spring
 
 
 @dataclass(eq=False)
@@ -53,11 +53,12 @@ class SpringsStage(NodalLoad):
         super().__init__(solver, name)
         self.bars = items = [bar for item in self.items for bar in item.bars]
         own = spring.Springs()
-        counts = [n for item in items for n in (item.middle, len(item.node) - item.middle)]
+        node = np.concatenate([item.node for item in items])
+        weight = np.concatenate([item.weight for item in items])
+        counts = [len(item.node) for item in items]
         own.begin = wp.array(offsets(counts), dtype=wp.int32)
-        own.node = wp.array(np.concatenate([item.node for item in items]), dtype=wp.int32)
-        own.weight = wp.array(np.concatenate([item.weight for item in items]), dtype=wp.float64)
-        for key in ("ground", "direction"):
+        own.node, own.weight = wp.array(node, dtype=wp.int32), wp.array(weight, dtype=wp.float64)
+        for key in ("between", "direction"):
             setattr(own, key, wp.array([getattr(item, key) for item in items], dtype=wp.vec3d))
         for key in ("rest", "lowest", "lightness"):
             setattr(own, key, self.numbers(key))
@@ -66,7 +67,8 @@ class SpringsStage(NodalLoad):
         joined = np.concatenate(tables, axis=1)
         own.x, own.y = wp.array(joined[0], dtype=wp.float64), wp.array(joined[1], dtype=wp.float64)
         self.length, self.preload = self.numbers("length"), self.numbers("preload")
-        self.springs, self.scenes, self.dt = own, solver.layout.count, solver.common_dt
+        self.springs, self.dt = own, solver.common_dt
+        self.ends, self.force = _ends(node, weight, counts), wp.zeros(self.count, dtype=wp.vec3d)
         self.lanes = BLOCK if wp.get_device().is_cuda else 1
 
     def entries(self, item: Any) -> int:
@@ -85,7 +87,7 @@ class SpringsStage(NodalLoad):
 
     def record_kernels(self) -> list[Any]:
         """Those of a step, which have blocks of Warp's own size."""
-        return [*super().record_kernels(), spring.pull_springs]
+        return [*super().record_kernels(), spring.pull_springs, spring.add_pulls]
 
     def push(self, step: Step, start: bool = False) -> None:
         """Add the forces of all springs."""
@@ -96,9 +98,10 @@ class SpringsStage(NodalLoad):
         state, work, kept = step.state, self.work, spring.SpringState()
         for field in fields(SpringsState):
             setattr(kept, field.name, getattr(state.parts[self.name], field.name))
-        inputs = [self.first, self.springs, length, preload, work.X, state.u, state.v, self.dt, not start]
-        threads, outputs = (self.scenes, self.lanes), [work.nodal_force, kept]
+        inputs = [self.springs, length, preload, state.u, state.v, self.dt, not start]
+        threads, outputs = (self.count, self.lanes), [self.force, kept]
         wp.launch(spring.pull_springs, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK)
+        wp.launch(spring.add_pulls, len(self.ends.node), inputs=[self.ends, self.force], outputs=[work.nodal_force])
 
     def feel(self, state: State, ahead: State, way: Array) -> None:
         """Count what dashpots took; no force gave what speeds changed by."""
@@ -106,8 +109,7 @@ class SpringsStage(NodalLoad):
         tension = 0.5 * (own.damper.numpy() + ahead.parts[self.name].damper.numpy())
         moved = np.zeros((self.count, 3))
         for k, item in enumerate(self.bars):
-            parts = item.weight[:, None] * way[item.node]
-            moved[k] = parts[item.middle :].sum(axis=0) - parts[: item.middle].sum(axis=0)
+            moved[k] = item.weight @ way[item.node]
         own.taken.assign(own.taken.numpy() + (tension * moved).sum(axis=1))
         own.speed.assign(own.speed.numpy() - moved / self.dt)
 
@@ -120,3 +122,14 @@ class SpringsStage(NodalLoad):
         """Tension and elongation."""
         own = state.parts[self.name]
         return [own.tension, own.elongation]
+
+
+def _ends(node: Index, weight: Array, counts: list[int]) -> spring.Ends:
+    """The springs at each node, from the nodes and weights of each spring in turn."""
+    order, own = np.argsort(node, kind="stable"), spring.Ends()
+    nodes, begin = np.unique(node[order], return_index=True)
+    owner = np.repeat(np.arange(len(counts)), counts)[order]
+    own.node, own.spring = wp.array(nodes, dtype=wp.int32), wp.array(owner, dtype=wp.int32)
+    own.begin = wp.array([*begin, len(node)], dtype=wp.int32)
+    own.weight = wp.array(weight[order], dtype=wp.float64)
+    return own
