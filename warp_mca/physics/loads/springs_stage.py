@@ -124,7 +124,7 @@ class SpringsStage(NodalLoad):
         return [own.tension, own.elongation]
 
 
-def _ends(node: Index, weight: Array, counts: list[int]) -> spring.Ends:
+def _ends(node: Index, weight: Array, counts: list[int]) -> Any:
     """The springs at each node, from the nodes and weights of each spring in turn."""
     order, own = np.argsort(node, kind="stable"), spring.Ends()
     nodes, begin = np.unique(node[order], return_index=True)
