@@ -6,7 +6,16 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.laws import Laws
-from warp_mca.kernels.contact.nearest import Master, Nearest, edge_of, is_outside, master_velocity, passes_by, reachable
+from warp_mca.kernels.contact.nearest import (
+    SLACK,
+    Master,
+    Nearest,
+    edge_of,
+    is_outside,
+    master_velocity,
+    passes_by,
+    reachable,
+)
 from warp_mca.kernels.contact.projection import area_vector, weights_at
 from warp_mca.kernels.contact.search import TOO_DEEP, TURNED
 from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring, release_function, rest_function, spring_function
@@ -95,6 +104,17 @@ def meet_side(
     return touch
 
 
+@wp.func
+def jump(near: Nearest, touch: Touch) -> wp.float64:
+    """By how much the depth of a pressed node that goes to another face changes beside its motion [m].
+
+    0 up to what that motion explains. A face that comes into reach beyond a rim may have the node far deeper.
+    """
+    found = -near.gap - touch.held + wp.dot(touch.du, near.normal)
+    most = wp.length(touch.du) + wp.float64(SLACK) * edge_of(near)
+    return wp.where(wp.abs(found) > most, found, wp.float64(0.0))
+
+
 @cache
 def settle_functions(friction: bool, laws: Laws) -> tuple[Any, Any]:
     """The functions (settle: press a node on the face that it touches; let_go: release a node that found no face)."""
@@ -123,6 +143,8 @@ def settle_functions(friction: bool, laws: Laws) -> tuple[Any, Any]:
         rest = spring.rest[s]
         if touch.touches and is_open and touch.begins < wp.float64(FAR):
             rest = wp.max(-near.gap - touch.begins, wp.float64(0.0))
+        if touch.touches and not is_open and spring.face[s] != near.face:
+            rest = wp.max(rest + jump(near, touch), wp.float64(0.0))
         gap_pressed, rest = gap_from_rest(s, gap_kept, rest, spring)
         k_old = wp.where(is_open, wp.min(touch.own, touch.limit), spring.stiffness[s])
         stiffness = wp.where(touch.touches, wp.min(k_old, touch.limit), k_old)

@@ -186,10 +186,10 @@ def spring_function(friction: bool, laws: Laws) -> Any:
         tangential, friction_work, stick_impulse = friction_before(s, spring)
         half = wp.float64(0.5)
         Fn, stored = law_force(-gap, k, spring.parameters, s), law_energy(-gap, k, spring.parameters, s)
-        owed, spent = wp.float64(0.0), wp.float64(0.0)
+        owed, spent, aside = wp.float64(0.0), wp.float64(0.0), wp.vec3d()  # `aside` lies across the normal
         if wp.static(laws.returns):
             F, W = law_force(-gap, k_old, spring.parameters, s), law_energy(-gap, k_old, spring.parameters, s)
-            c, owed, spent = pay(s, F, W, k_old, force_old, tangential, du, normal, slip, spring)
+            c, aside, owed, spent = pay(s, F, W, k_old, force_old, tangential, du, normal, slip, spring)
             Fn += c
         if wp.static(damped):
             Fn, dissipated = damp(s, Fn, -gap, normal, du, k, force_old - tangential, dt, spring)
@@ -199,6 +199,8 @@ def spring_function(friction: bool, laws: Laws) -> Any:
             share, lost = soften(s, gap, normal, du, k_old, k, spring)
             spent += lost
         force = Fn * normal
+        if wp.static(laws.returns):
+            force += aside
         energy = stored + owed
         if wp.static(friction):
             limit = mu * Fn

@@ -19,6 +19,7 @@ SHARE = 0.05  # greatest force that returns energy, over the force of a pressed 
 PULL = 0.1  # the same over k times the motion of a step
 IDLE = 1e-3  # debt that rests, over the energy of a pressed spring
 LEAST = 1e-6  # debt that counts as returned once a spring is open, over k times the square of that motion
+TURNS = 0.02  # sine of the angle between a normal and the last force from which on it has turned
 
 ANY_DEPTH = 1e30  # `Spring.held` before the first step, when bodies may overlap [m]
 GONE = -1  # `Spring.face` of a spring that neither presses nor returns energy
@@ -62,8 +63,12 @@ def pay(
     normal: wp.vec3d,
     slip: wp.vec3d,
     spring: Any,
-) -> tuple[wp.float64, wp.float64, wp.float64]:
+) -> tuple[wp.float64, wp.vec3d, wp.float64, wp.float64]:
     """What spring s, which holds W and presses with F, adds to its force [N]; sets what it owes then.
+
+    A force whose direction jumps, as in a dent, drives a node to and fro across the jump. Energy that it made so is
+    taken back where it went: along the way in which the normal turned, also for steps after that, since the force aside
+    keeps the last direction apart from the normal.
 
     Args:
         k: its stiffness [N/m].
@@ -72,12 +77,13 @@ def pay(
         normal, slip: unit normals of the face, and of the plane in which friction acts.
 
     Returns:
-        This force; what the spring owes then [J]; how much less contact has lost, because the spring begins with
-        energy that another one lost, below 0 [J].
+        This force along the normal, and across it; what the spring owes then [J]; how much less contact has lost,
+        because the spring begins with energy that another one lost, below 0 [J].
     """
     half, zero = wp.float64(0.5), wp.float64(0.0)
     owed = spring.owed[s]
     c = zero
+    aside = wp.vec3d()
     left = zero
     lost = zero
     if owed[2] > zero and F > zero:
@@ -91,11 +97,20 @@ def pay(
         turned = wp.dot(along, slip)  # the part that friction loses where its plane has turned
         left += half * turned * (turned / k - wp.dot(du, slip))
         if wp.abs(left) > wp.float64(wp.static(IDLE)) * W and out != zero:
-            c = returning(left, out, owed[2] * F)
-            left -= half * c * out
+            pressure = before - along
+            turn = wp.dot(pressure, normal) * normal - pressure
+            size = wp.length(turn)
+            if left < zero and size > wp.float64(wp.static(TURNS)) * wp.length(pressure):
+                turn = turn / size
+                out = wp.dot(du, turn)
+                aside = returning(left, out, owed[2] * F) * turn
+                left -= half * wp.dot(aside, du)
+            else:
+                c = returning(left, out, owed[2] * F)
+                left -= half * c * out
     spring.owed[s] = wp.vec3d(left, c, owed[2])
     spring.lost[s] = spring.lost[s] + lost
-    return c, left, lost
+    return c, aside, left, lost
 
 
 @cache
