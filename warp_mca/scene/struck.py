@@ -41,7 +41,7 @@ _FAR = 20.0
 _SIZE = 0.7  # to ask for, over the mean edge [-]
 _TOLD = (
     "the fall crushes {name} about {depth:.2g} m deep, where its cells are {size:.2g} m: its greatest force may be "
-    "some 10 % off; give struck a smaller size, as {wanted:.2g} or less"
+    "10 % off or more; give struck a smaller size, as {wanted:.2g} or less"
 )
 _WORTH = 0.7  # of their size: cells that are not smaller are left as they are [-]
 _LEAST, _MOST = 1e-5, 0.2  # depths over the height of the parts, below which all is flat and above which none is [-]
