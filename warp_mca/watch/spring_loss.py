@@ -210,18 +210,30 @@ def _wave_forces(c: Context, pair: Pair, time: float, driven: float = 0.0) -> tu
     if not soft or (not driven and speed <= STILL * float(np.linalg.norm(between))):
         return math.inf, math.inf
     area = {name: shadow(c, name, normal) for name in names}
-    least = min(area.values()) / sum(1.0 / impedance(c, name, "bar")[0] for name in soft)
-    most = 1.0 / sum(1.0 / (impedance(c, name)[0] * area[name]) for name in soft)
-    return speed * least, speed * most
+    if not (smallest := min(area.values())):  # of a closed master that is driven from rest
+        return 0.0, 0.0
+    least = speed * smallest / sum(1.0 / impedance(c, name, "bar")[0] for name in soft)
+    return least, speed / sum(1.0 / (impedance(c, name)[0] * area[name]) for name in soft)
 
 
 def _return_time(c: Context, pair: Pair) -> float:
-    """Time after which a wave is back from the far side of one of two bodies [s], 0 of rigid ones."""
+    """Time after which a wave is back from the far side of one of two bodies [s].
+
+    Of a rigid body, which knows no waves, its shortest side counts: so wide they begin in the other one.
+    """
     names, axis = pair
+    speed = {
+        name: min(material.wave_speeds["bar"] for material, _ in body_materials(c.scene.body(name), c.meshes[name]))
+        for name in names
+        if not c.scene.body(name).rigid
+    }
     found = []
     for name in names:
-        X, body = c.model.X[c.nodes(name)], c.scene.body(name)
-        length = float(np.ptp(X @ axis)) if axis.any() else float(np.ptp(X, axis=0).max())
-        slowest = min(material.wave_speeds["bar"] for material, _ in body_materials(body, c.meshes[name]))
-        found.append(0.0 if body.rigid else 2.0 * length / slowest)
+        X = c.model.X[c.nodes(name)]
+        sides = np.ptp(X, axis=0)
+        if name not in speed:
+            length = sides.min()
+        else:
+            length = np.ptp(X @ axis) if axis.any() else sides.max()
+        found.append(2.0 * float(length) / speed.get(name, min(speed.values())))
     return min(found)
