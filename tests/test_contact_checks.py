@@ -3,7 +3,7 @@
 import pytest
 
 import warp_mca as mca
-from warp_mca.watch.energy import PEAK_LOSS
+from warp_mca.watch.spring_loss import PEAK_LOSS
 
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
 

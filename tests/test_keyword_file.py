@@ -125,7 +125,12 @@ def test_elements_other_than_solids_are_left_out_with_a_word(tmp_path: Path, cap
         ("*PART_INERTIA\nname\n1,1,1\n0.,0.,0.,1.\n", "1 inertias of parts"),
         ("*FROBNICATE\n1\n", r"other keywords \(.FROBNICATE\)"),
         ("*SET_NODE\n6\n1,888\n", "1 numbers in sets that nothing has"),
-        ("*CONTROL_TERMINATION\n0.1\n*DEFINE_CURVE\n1\n0.,1.\n*SECTION_SOLID\n1,1\n", "^$"),
+        ("*DEFINE_CURVE\n1\n0.,1.\n*SECTION_SOLID\n1,1\n", "1 definitions .*1 sections"),
+        (
+            "*CONTROL_TERMINATION\n0.1\n*DATABASE_GLSTAT\n1.\n*DATABASE_FORMAT\n",
+            r"1 settings .*2 requests of output \(.DATABASE_GLSTAT, .DATABASE_FORMAT\)$",
+        ),
+        ("*TITLE\nit\n*COMMENT\nword\n", "^$"),
     ],
 )
 def test_what_is_left_out_is_counted(tmp_path: Path, lines: str, words: str):

@@ -164,10 +164,7 @@ KEYWORD_RULES = Rules(
         *("SET_NODE", "SET_NODE_LIST", "SET_NODE_LIST_GENERATE", "SET_NODE_COLUMN", "SET_SEGMENT"),
         *("SET_SOLID", "SET_SOLID_GENERATE"),
     ),
-    silent=(
-        *("", "TITLE", "COMMENT*", "CONTROL_*", "DATABASE_*", "DEFINE_*", "SECTION_*", "HOURGLASS*"),
-        *("TERMINATION*", "USER_*"),
-    ),
+    silent=("", "TITLE", "COMMENT*"),
     left_out={
         ELEMENTS: ("ELEMENT_*",),
         "inertias of parts": ("PART_INERTIA",),
@@ -177,5 +174,9 @@ KEYWORD_RULES = Rules(
         "boundary conditions and loads": ("BOUNDARY_*", "LOAD_*", "INITIAL_*", "AIRBAG_*"),
         "sets": ("SET_*",),
         "nodes of other kinds": ("NODE_*",),
+        "sections": ("SECTION_*",),
+        "definitions": ("DEFINE_*",),
+        "settings": ("CONTROL_*", "HOURGLASS*", "TERMINATION*", "USER_*"),
+        "requests of output": ("DATABASE_*",),
     },
 )

@@ -81,7 +81,7 @@ class MeshReader:
             cards = sum(bool(line.strip()) for _, line in block.lines)
             if cards and kind == ELEMENTS:
                 self.deck.left[kind, f"cards of *{name}"] += cards
-            elif cards and kind not in ("", "read"):
+            elif kind not in ("", "read", ELEMENTS):
                 self.deck.left[kind, f"*{name}"] += 1
 
     def take_mesh(self, block: Keyword) -> None:

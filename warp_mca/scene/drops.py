@@ -180,8 +180,13 @@ def _contacts(
     if floor:
         itself = ("floor", "floor")
         among = [replace(c, exclude=(*c.exclude, itself)) if isinstance(c, ContactAll) else c for c in among]
-    finer = {b.name: PENALTY for a, b in zip(bodies, placed, strict=True) if a.geometry is not b.geometry}
+    finer = {b.name: PENALTY for a, b in zip(bodies, placed, strict=True) if _places(a) != _places(b)}
     return (*among, *(Contact(slave=skin, master=master, mu=mu, penalty=finer.get(skin.body)) for skin in skins))
+
+
+def _places(body: Body) -> object:
+    """Places with finer cells in a body's geometry."""
+    return getattr(body.geometry, "finer", ())
 
 
 _OPEN = ("xmin", "xmax", "ymin", "ymax", "zmin")  # sides of a real floor that let waves out

@@ -30,14 +30,18 @@ FLAT = 1.25  # exponent of W(d) up to which a place is flat [-]
 # edge strikes. The shorter step is needed, too: crushed cells flatten, and became unstable with 2.
 PENALTY = 10.0
 FINEST = 4.0  # times smaller than the cells there, at most: steps are as many times more [-]
-# Cells that are so many times greater than those over the crushed depth would be are told of [-]. The depth is that of
-# the finer cells: on those before, a round side is a corner, which is crushed up to three times as deep. A ball of ABS
-# had 11 times, and a greatest force 1 % below that of cells half as large; a steel cylinder on its side, 12 mm thick,
-# had 27 times with across=1 and 38 with 2, and was 6 % above and 5 % below; one of aluminium, 42 times and 10 %.
-_FAR = 16.0
+# Cells whose mean edge is so many times greater than those over the crushed depth would be are told of [-], 1.3 times
+# as many as the size that makes them. On cells that are not finer, a round side is a corner, which is crushed up to
+# three times as deep. By sizes, a ball of ABS had 11 times, and a greatest force 1 % below that of cells half as large;
+# a steel cylinder on its side, 12 mm thick, had 27 times with across=1 and 38 with 2, and was 6 % above and 5 % below;
+# one of aluminium, 42 times and 10 %. Balls of 40 mm in cells of 5 mm, none finer: ABS 19 times and 17 % above,
+# aluminium 24 times and 22 % below; in cells of 3.3 mm 15 and 21 times, and 3 %; cylinders on their side 34 to 83 times
+# and 5 % at most.
+_FAR = 20.0
+_SIZE = 0.7  # to ask for, over the mean edge [-]
 _TOLD = (
-    "the fall crushes {name} about {depth:.2g} m deep, where its cells are {size:.2g} m, a quarter of those without: "
-    "its greatest force may be some 10 % off; give struck a smaller size, as {wanted:.1g}"
+    "the fall crushes {name} about {depth:.2g} m deep, where its cells are {size:.2g} m: its greatest force may be "
+    "10 % off or more; give struck a smaller size, as {wanted:.2g} or less"
 )
 _WORTH = 0.7  # of their size: cells that are not smaller are left as they are [-]
 _LEAST, _MOST = 1e-5, 0.2  # depths over the height of the parts, below which all is flat and above which none is [-]
@@ -50,6 +54,8 @@ def finer_where_struck(
 ) -> list[Body]:
     """Bodies above the floor z = 0, with finer cells and strains taken as large where they strike it; [] if all stay.
 
+    Those whose cells are coarse there say so.
+
     Args:
         bodies: in their places.
         meshes: of these.
@@ -58,21 +64,18 @@ def finer_where_struck(
     """
     from warp_mca.geometry.cad import Cad
 
-    if struck == "off" or not any(isinstance(body.geometry, Cad) for body in bodies):
+    if not any(isinstance(body.geometry, Cad) for body in bodies):
         return []
-    parts, lowest, depth = _looked_at(bodies, meshes, energy)
-    found = [_finer(body, parts.get(body.name), lowest, depth, struck) for body in bodies]
-    if all(one is other for one, other in zip(found, bodies, strict=True)):
-        return []
-    if struck == "auto":
-        depth = _looked_at(found, [mesh_of(body) for body in found], energy)[2]
-        changed = [one is not other for one, other in zip(found, bodies, strict=True)]
-        found = [_told(body, depth) if new else body for body, new in zip(found, changed, strict=True)]
-    return found
+    looked = _looked_at(bodies, meshes, energy)
+    found = [_finer(body, looked, struck) for body in bodies]
+    if any(one is not other for one, other in zip(found, bodies, strict=True)):
+        looked = _looked_at(found, [mesh_of(body) for body in found], energy)
+    found = [_told(body, looked) for body in found]
+    return [] if all(one is other for one, other in zip(found, bodies, strict=True)) else found
 
 
-def _looked_at(bodies: Sequence[Body], meshes: Sequence[Mesh], energy: float) -> tuple[dict[str, _Cells], float, float]:
-    """Cells of the bodies of CAD files by name, the lowest height of all [m], and the crushed depth [m], 0 if flat."""
+def _looked_at(bodies: Sequence[Body], meshes: Sequence[Mesh], energy: float) -> _Looked:
+    """Where bodies in their places strike with an energy [J]."""
     from warp_mca.geometry.cad import Cad
 
     pairs = list(zip(bodies, meshes, strict=True))
@@ -80,16 +83,17 @@ def _looked_at(bodies: Sequence[Body], meshes: Sequence[Mesh], energy: float) ->
     lowest = min(float(in_place(body, mesh)[:, 2].min()) for body, mesh in pairs)
     heights = np.concatenate([part.heights for part in parts.values()]) - lowest
     depth, exponent = crushed_depth(heights, np.concatenate([part.work for part in parts.values()]), energy)
-    return parts, lowest, depth if exponent > FLAT else 0.0
+    return _Looked(parts, lowest, depth if exponent > FLAT else 0.0)
 
 
-def _told(body: Body, depth: float) -> Body:
-    """A body with finer cells, which says so if these are coarse for the crushed depth [m]."""
+def _told(body: Body, looked: _Looked) -> Body:
+    """A body, which says so if its cells are coarse for the crushed depth."""
     geometry: Any = body.geometry
-    size, wanted = geometry.finer[-1].size, _FAR * depth / (ROWS * geometry.across)
-    if not 0.0 < wanted < size:
+    size = looked.size(body, looked.depth)
+    most = _FAR * looked.depth / (ROWS * geometry.across)
+    if not 0.0 < most < size:
         return body
-    note = _TOLD.format(name=body.name, depth=depth, size=size, wanted=wanted)
+    note = _TOLD.format(name=body.name, depth=looked.depth, size=size, wanted=_SIZE * most)
     return replace(body, geometry=replace(geometry, notes=(*geometry.notes, note)))
 
 
@@ -107,6 +111,28 @@ class _Cells(NamedTuple):
     size: Array
 
 
+class _Looked(NamedTuple):
+    """Where parts strike.
+
+    Attributes:
+        parts: cells of the bodies of CAD files, by name.
+        lowest: height of the lowest point of all bodies [m].
+        depth: that the fall crushes [m], 0 where the place is flat.
+    """
+
+    parts: dict[str, _Cells]
+    lowest: float
+    depth: float
+
+    def size(self, body: Body, depth: float) -> float:
+        """Mean edge of a body's cells that lie within a depth [m]; 0 if none do, and of rigid bodies."""
+        cells = self.parts.get(body.name)
+        if cells is None or body.rigid:
+            return 0.0
+        near = cells.heights[:, 0] <= self.lowest + depth
+        return float(cells.size[near].mean()) if near.any() else 0.0
+
+
 def _cells(body: Body, mesh: Mesh) -> _Cells:
     from warp_mca.geometry.cell_types import TETRA10, linear_type
 
@@ -119,15 +145,13 @@ def _cells(body: Body, mesh: Mesh) -> _Cells:
     return _Cells(np.sort(corners[:, :, 2], axis=1), volume * strength, size)
 
 
-def _finer(body: Body, cells: _Cells | None, lowest: float, depth: float, struck: float | str) -> Body:
-    """A body with finer cells if it is struck and they are worth it, else as it is; `depth` is 0 where all is flat."""
+def _finer(body: Body, looked: _Looked, struck: float | str) -> Body:
+    """A body with finer cells if it is struck and they are worth it, else as it is."""
     geometry: Any = body.geometry
-    if cells is None or body.rigid or (struck == "auto" and (geometry.size is not None or not depth)):
+    depth, lowest = looked.depth, looked.lowest
+    usual = looked.size(body, depth if isinstance(struck, str) else max(depth, struck))
+    if not usual or struck == "off" or (struck == "auto" and (geometry.size is not None or not depth)):
         return body
-    near = cells.heights[:, 0] <= lowest + (depth if isinstance(struck, str) else max(depth, struck))
-    if not near.any():
-        return body
-    usual = float(cells.size[near].mean())
     crushed, finest = depth / (ROWS * geometry.across), usual / FINEST
     size = max(crushed, finest) if isinstance(struck, str) else struck
     if size > _WORTH * usual:

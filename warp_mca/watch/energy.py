@@ -10,31 +10,16 @@ import numpy as np
 
 from warp_mca.base.arrays import Array
 from warp_mca.kernels.records.columns import PRESSURE, SPRING_ENERGY
-from warp_mca.physics.contact.sides import face_geometry
 from warp_mca.physics.elements import ELEMENTS
 from warp_mca.scene import Bolt, Contact, ContactAll, Settle, ThermalStrain
-from warp_mca.watch.contacts import on_edges
 from warp_mca.watch.ledger import MIN_EXCHANGE
 from warp_mca.watch.row import Context, Finished, SpringShare, Values, row, sides_of
-from warp_mca.watch.vibration import impedance, shadow
+from warp_mca.watch.spring_loss import Peak, curved_contacts, loss_of_peak
 
 if TYPE_CHECKING:
-    from warp_mca.system.model import Model
     from warp_mca.watch.ledger import Ledger
 
-# Relative loss of the force peak of a curved contact, or of one on edges, over the share of the exchanged energy that
-# springs hold then; measured on balls, links and edges within a factor of 2, see docs/decisions.md.
-PEAK_LOSS = 0.3
-# Force of a flat contact over that of one wave up to which it may be that wave: with default springs, and with others,
-# such as those of curved skins that land on a flat end, which may ring at 3.4 times that force.
-WAVE = (1.3, 4.0)
-CROSSINGS = 4.0  # of a body by waves, after which a drive presses it as slowly as no wave tells
-STILL = 1e-6  # share of a relative velocity along the normal up to which bodies do not approach each other
 WEIGHT = 2.0  # times the weight of all bodies: a contact at rest of no more force bears it
-_LANDED, _ALIKE = 0.95, 1e-3  # least share of the shadow of a body that lands flat, most difference of its speeds [-]
-_THIN = 0.5  # greatest height of a body over the root of its shadow: taller ones widen as bars do, and press less
-_PLASTIC = 0.03  # of the exchanged energy: more plastic work limits the force
-WEAK = 0.7  # force of a flat contact over that of one wave below which springs that were given are softer than waves
 
 
 @row(
@@ -73,7 +58,7 @@ def turned_edge(c: Finished, _: float) -> Iterator[Values]:
 )
 def soft_springs(c: Finished, most: float) -> Iterator[Values]:
     """Estimated loss of each contact's force peak by the energy in its springs then, see `spring_shares`."""
-    curved = _curved(c.model)
+    curved = curved_contacts(c.model)
     for k, ((name, springs), contact) in enumerate(zip(c.shares.items(), c.scene.contacts, strict=True)):
         if springs is not None and springs.loss > most and not springs.rest and not _given(contact):
             remedy = "raise the contact's penalty, or refine the mesh there"
@@ -128,8 +113,7 @@ def spring_shares(
 
     What is exchanged is kinetic energy gained or lost since the start, or energy that is not kinetic, whichever is
     greater, as for `Ledger.exchange_error`. None where there is no force, or hardly anything was exchanged. Where an
-    interference loads contacts at rest, all their springs and the bodies are in series: they lose s of its force. What
-    lands flat on a plane loses what its force lacks of that of a wave.
+    interference loads contacts at rest, all their springs and the bodies are in series: they lose s of its force.
 
     Args:
         c: scene, meshes and model.
@@ -143,7 +127,6 @@ def spring_shares(
     exchanged = np.maximum(np.abs(kinetic - kinetic[:1]), stored - kinetic)
     series = energy["contact"] + energy["elastic"]  # what an interference stores in springs and bodies
     found: dict[str, SpringShare | None] = dict.fromkeys(names)
-    curved = _curved(c.model)
     for k, name in enumerate(names):
         own = springs[:, [item.contact == k for item in c.model.passes]]
         force, held = own[..., PRESSURE].sum(axis=1), own[..., SPRING_ENERGY].sum(axis=1)
@@ -155,25 +138,20 @@ def spring_shares(
         if not len(force) or force[greatest] <= 0.0 or exchanged[greatest] <= MIN_EXCHANGE * ledger.kept.energy_scale:
             continue
         row = _row_at_rest(c, k, force, greatest)
-        if row is None:
-            share = float(held[greatest] / exchanged[greatest])
-            lands = _lands_flat(c, k, depths)  # as a round bar does with its end, though its skin is curved
-            flat = contact if isinstance(contact, Contact) and (lands or k not in curved) else None
-            edges, loss, landed = flat is not None and on_edges(c, k, depths), PEAK_LOSS * share, None
-            if flat is not None and lands and energy["plastic"][greatest] <= _PLASTIC * exchanged[greatest]:
-                landed = _loss_of_landing(c, k, flat, float(force[greatest]))
-            if landed is not None:
-                loss = landed
-            elif flat is not None and not edges:
-                in_series = float(energy["contact"][greatest] / series[greatest]) if series[greatest] > 0.0 else 0.0
-                greatest_force = math.inf if pulled else float(force[greatest])
-                loss = _loss_of_flat(c, k, flat, share, in_series, greatest_force, ledger.time())
-            elif isinstance(contact, ContactAll) and k not in curved and _is_pressed_slowly(c, greatest):
-                loss = float(energy["contact"][greatest] / series[greatest])
-            found[name] = SpringShare(share=share, loss=loss, edges=edges)
-        else:
+        if row is not None:
             loss = float(energy["contact"][row] / series[row])
             found[name] = SpringShare(share=float(held[row] / series[row]), loss=loss, rest=True)
+            continue
+        peak = Peak(
+            share=float(held[greatest] / exchanged[greatest]),
+            plastic=float(energy["plastic"][greatest] / exchanged[greatest]),
+            series=float(energy["contact"][greatest] / series[greatest]) if series[greatest] > 0.0 else 0.0,
+            force=math.inf if pulled else float(force[greatest]),
+            time=ledger.steps.interval * greatest,
+            pressed=ledger.steps.interval * (greatest - int(np.argmax(force > 0.0)) + 1),
+        )
+        loss, edges = loss_of_peak(c, k, depths, peak, ledger.time())
+        found[name] = SpringShare(share=peak.share, loss=loss, edges=edges)
     return found
 
 
@@ -201,88 +179,3 @@ def _row_at_rest(c: Context, k: int, force: Array, greatest: int) -> int | None:
     row = 0 if any(isinstance(phase, Settle) for phase in c.scene.phases) else greatest
     weight = float(np.linalg.norm(c.scene.gravity)) * float(c.model.mass.sum())
     return row if force[row] > WEIGHT * weight else None
-
-
-def _curved(model: Model) -> set[int]:
-    """Contacts of curved surfaces."""
-    return {item.contact for item in model.passes if item.curved}
-
-
-def _loss_of_flat(
-    c: Context, k: int, contact: Contact, share: float, in_series: float, force: float, time: float
-) -> float:
-    """Relative loss of the peak of a flat contact k whose springs held a share then.
-
-    It is that of a mass on two springs in series, 1 - sqrt(1 - s), but none of the force of a single wave. Drives that
-    press bodies on each other, or pull those that are bonded, lose all that springs take, `in_series`.
-    """
-    given, wave = contact.penalty is not None or k in _curved(c.model), _wave_force(c, k, contact, time)
-    if (speed := _driven_speed(c)) and math.isinf(wave):
-        return in_series if force > WAVE[True] * _wave_force(c, k, contact, time, speed) else 0.0
-    if math.isinf(force):  # of a bond that is pulled
-        return 0.0
-    if force > WAVE[given] * wave:
-        return 1.0 - math.sqrt(1.0 - min(share, 1.0))
-    return PEAK_LOSS * share if given and force < WEAK * wave else 0.0
-
-
-def _lands_flat(c: Context, k: int, depths: Sequence[Array]) -> bool:
-    """Whether contact k is that of a body that lands on a plane with all of its shadow at once."""
-    own = [(item, depth) for item, depth in zip(c.model.passes, depths, strict=True) if item.contact == k]
-    contact = c.scene.contacts[k]
-    if not isinstance(contact, Contact) or len(own) != 1 or own[0][0].plane is None or c.model.fails:
-        return False
-    (item, depth), normal, body = own[0], c.model.contact_axes[k, 0], contact.slave.body
-    speed = c.model.V[c.nodes(body)] @ normal
-    if not depth.any() or np.ptp(speed) > _ALIKE * np.abs(speed).max():
-        return False
-    pressed = item.slave[depth.reshape(len(item.slave), -1).max(axis=1) > 0.0]
-    faces = item.slave_face[np.isin(item.slave_face, pressed).all(axis=1)]
-    return np.abs(face_geometry(c.model.X, faces)[1] @ normal).sum() >= _LANDED * shadow(c, body, normal)
-
-
-def _loss_of_landing(c: Context, k: int, contact: Contact, force: float) -> float | None:
-    """Relative loss of the peak of contact k, of a thin body that does not yield and lands flat.
-
-    At first it presses with Z v A, whatever is behind; springs that are softer than a thin wall do not come to that
-    before waves are back. None of other bodies, and where more than a wave presses.
-    """
-    normal, body = c.model.contact_axes[k, 0], contact.slave.body
-    wave, height = _wave_force(c, k, contact, 0.0), float(np.ptp(c.model.X[c.nodes(body)] @ normal))
-    if math.isinf(wave) or force > WAVE[False] * wave or height > _THIN * math.sqrt(shadow(c, body, normal)):
-        return None
-    return max(0.0, 1.0 - force / wave)
-
-
-def _is_pressed_slowly(c: Context, row: int) -> bool:
-    """Whether drives press bodies on each other that were at rest, and waves crossed each of them before a row."""
-    time = row * c.scene.impact.output_interval
-    if c.model.V.any() or not _driven_speed(c):
-        return False
-    names = [body.name for body in c.scene.bodies if not body.rigid]
-    return all(
-        time * impedance(c, name)[1] > CROSSINGS * np.ptp(c.model.X[c.nodes(name)], axis=0).max() for name in names
-    )
-
-
-def _driven_speed(c: Context) -> float:
-    """Greatest speed of drives that move nodes [m/s]."""
-    return max((max(map(abs, item.velocity_table[1])) for item in c.scene.prescribed), default=0.0)
-
-
-def _wave_force(c: Context, k: int, contact: Contact, time: float, driven: float = 0.0) -> float:
-    """Force that a single wave gives in contact k by `time` [N]: Z v A, inf of rigid bodies and where none approach.
-
-    With a `driven` speed [m/s] it counts in place of that at which bodies approach.
-    """
-    names, axis = sides_of(contact), c.model.contact_axes[k, 0]
-    means = [c.model.V[c.nodes(name)].mean(axis=0) for name in names]
-    between = (means[0] - means[1] if len(means) > 1 else means[0]) + time * c.model.gravity[0]
-    normal = axis if axis.any() else between / max(float(np.linalg.norm(between)), 1e-30)
-    speed = abs(float(between @ normal))
-    if driven:
-        speed = driven
-    soft = [impedance(c, name)[0] for name in names if not c.scene.body(name).rigid]
-    if not soft or (not driven and speed <= STILL * float(np.linalg.norm(between))):
-        return math.inf
-    return speed / sum(1.0 / Z for Z in soft) * min(shadow(c, name, normal) for name in names)

@@ -202,10 +202,10 @@ def _impedance(c: Finished, body: str, normal: Array) -> tuple[float, float]:
     return Z * shadow(c, body, normal), speed
 
 
-def impedance(c: Context, body: str) -> tuple[float, float]:
-    """Greatest rho c [kg/(m^2 s)] of a body's materials, and the greatest c [m/s]."""
+def impedance(c: Context, body: str, wave: str = "dilatational") -> tuple[float, float]:
+    """Greatest rho c [kg/(m^2 s)] of a body's materials, and the greatest c [m/s], of a wave of `wave_speeds`."""
     materials = [material for material, _ in body_materials(c.scene.body(body), c.meshes[body])]
-    speeds = [material.wave_speeds["dilatational"] for material in materials]
+    speeds = [material.wave_speeds[wave] for material in materials]
     return max(m.rho * speed for m, speed in zip(materials, speeds, strict=True)), max(speeds)
 
 
