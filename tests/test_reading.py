@@ -14,7 +14,8 @@ from warp_mca.system.reading import on_host, read_once
 
 def fallen(count: int) -> list[mca.Scene]:
     """Boxes, a rigid one on each, that hit a plane with different speeds."""
-    steel, box = mca.Elastic(E=2e11, nu=0.3, rho=7850.0), mca.Box(size=(0.01, 0.01, 0.01), divisions=(2, 2, 2))
+    steel = mca.J2Bilinear(E=2e11, nu=0.3, rho=7850.0, sigma_y=3e8, E_t=2e9)
+    box = mca.Box(size=(0.01, 0.01, 0.01), divisions=(2, 2, 2))
     at = {"geometry": box, "material": steel, "velocity": (0.0, -1.0, 0.0)}
     low, high = mca.Surface(body="low", nodes="ymax"), mca.Surface(body="high", nodes="ymin")
     scene = mca.Scene(

@@ -16,6 +16,7 @@ from warp_mca.geometry.mesh import Mesh
 from warp_mca.phases.meshing import Shared
 from warp_mca.phases.prepare import Prepared, Request, prepare
 from warp_mca.phases.settings import Settings
+from warp_mca.phases.stress_rows import Room
 from warp_mca.scene import Scene
 from warp_mca.watch.held import MOST_CELLS as MOST_HELD
 from warp_mca.watch.held import Home, Question, hold, looked_at, parted, tell
@@ -48,7 +49,9 @@ def prepared(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | Non
     """
     made: dict[object, Mesh] = {}
     ready: list[Prepared] = []
-    if _may_help(request.settings, meshes):
+    room: Room | None = None
+    helped = _may_help(request.settings, meshes)
+    if helped:
         begin_for(len(scenes), request.settings.threads)
 
     def here(k: int) -> Prepared:
@@ -63,9 +66,13 @@ def prepared(scenes: Sequence[Scene], meshes: Sequence[Mapping[str, Mesh]] | Non
     for k in range(len(scenes)):
         begun = time.perf_counter()
         ready.append(here(k))
+        if k == 0 and helped and request.paths and len(scenes) >= MANY:
+            rows = round(request.span / scenes[0].impact.output_interval) + 1
+            room = Room(len(scenes), rows, len(ready[0].probes.corner))
         if k == 1 and _worth_it(ready, (time.perf_counter() - begun) * (len(scenes) - 2), request.settings, meshes):
-            return [*ready, *_by_helpers(scenes[2:], Shared(scenes[:2], made), request, lambda k: here(k + 2))]
-    return ready
+            ready += _by_helpers(scenes[2:], Shared(scenes[:2], made), request, lambda k: here(k + 2))
+            break
+    return [replace(item, room=room) for item in ready] if room else ready
 
 
 def begin_for(scenes: int, threads: int) -> None:

@@ -45,6 +45,7 @@ class ImpactDriver:
     def __init__(self, setup: Setup) -> None:
         self.setup, self.count, self.open_time = setup, 0, open_time(setup)
         self.film: Film | None = None
+        self._relaxation: Relaxation | None = None
         self._prepared: tuple[Motion | None, tuple[Prepared, ByBody, ByBody]] | None = None
 
     def run(self, motion: Motion | None) -> tuple[Motion | None, ImpactPart]:
@@ -56,7 +57,7 @@ class ImpactDriver:
         assert motion is not None
         setup, self.count = self.setup, self.count + 1
         ready, u, V = self.prepare(motion)
-        relaxation = Relaxation(ready.model, setup.request.settings)
+        relaxation = self._relaxation = Relaxation(ready.model, setup.request.settings, self._relaxation)
         settled: list[Shape] = []
         span = min(setup.request.span, setup.t_end - motion.t)
         shape = self._shape(motion, relaxation, u, settled) if motion.shapes else None

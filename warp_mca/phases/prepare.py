@@ -19,6 +19,7 @@ from warp_mca.phases.arguments import Progress
 from warp_mca.phases.meshing import mesh
 from warp_mca.phases.rate_groups import grouping
 from warp_mca.phases.settings import Settings
+from warp_mca.phases.stress_rows import Room
 from warp_mca.physics.elements.cells import nodal_masses
 from warp_mca.rigid.body_motion import held_axes
 from warp_mca.rigid.chain import Array, Chain
@@ -52,6 +53,7 @@ class Prepared:
         skins: of its bodies, as `skins_of`; empty where the impact makes them.
         home: where a helper holds it, too; None without one.
         masses: what `body_report` says of its bodies, where it was computed.
+        room: gives memory for its rows of stress; None where they get it as they come.
     """
 
     scene: Scene
@@ -64,6 +66,7 @@ class Prepared:
     skins: Sequence[Skin] = ()
     home: Home | None = None
     masses: Mapping[str, Mapping[str, float | None]] | None = None
+    room: Room | None = None
 
     def with_model(self, model: Model) -> Prepared:
         """With other passes of contact; it has no home where one is another, or becomes another in the run."""

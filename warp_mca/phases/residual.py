@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,6 +21,7 @@ from warp_mca.phases.settings import Settings
 from warp_mca.physics.rigid.bodies import moves_with_rigid
 from warp_mca.rigid.equilibrium import TOLERANCE, equilibrium
 from warp_mca.rigid.pieces import free_motions, shared_elements
+from warp_mca.rigid.stiffness import Stiffness
 from warp_mca.step.solver import Solver
 from warp_mca.system.bodies import GROUND
 from warp_mca.system.model import Model
@@ -62,8 +62,8 @@ class Shape:
 class Relaxation:
     """Relaxes states of one model of one scene."""
 
-    def __init__(self, model: Model, settings: Settings) -> None:
-        """Allocate a solver in float64 on the device of the `settings`."""
+    def __init__(self, model: Model, settings: Settings, before: Relaxation | None = None) -> None:
+        """Allocate a solver in float64 on the device of the `settings`; `before`: of the same bodies, turned since."""
         blocks = tuple(block.without_viscosity() for block in model.blocks)
         self.model = model = replace(model, rates=None, blocks=blocks)
         dt = model.stable.dt  # of any length: no step is taken
@@ -86,6 +86,7 @@ class Relaxation:
         self.masses = model.mass.copy()
         np.add.at(self.masses, model.joint_first[self.tied], model.mass[second[self.tied]])
         self.masses[second[self.tied]] = 0.0
+        self.stiffness = self._stiffness(before.stiffness if before else None)
 
     def settle(self, u: Array, state: State) -> Shape:
         """The equilibrium that lies nearest.
@@ -112,27 +113,23 @@ class Relaxation:
             held=self.held,
             name="the bodies",
             energy=self._energy,
-            pattern=self._pattern,
-            free=None if self._pattern is None else self._free(u),
+            stiffness=self.stiffness,
+            free=None if self.stiffness is None else self._free(u),
         )
         u = self._followed(found.u)
         self._evaluate(u)
         elastic, plastic, hourglass = self._energies()
         return Shape(u=u, state=self.trial, elastic=elastic, plastic=plastic, hourglass=hourglass)
 
-    @cached_property
-    def _pattern(self) -> sparse.csr_array | None:
-        """Which nodes act on each other: those that share an element, or a neighbour where pressures are of nodes.
-
-        Nodes that follow others are in the place of these. None with ties of skins.
-        """
-        model, place = self.model, np.arange(self.model.node_count)
+    def _stiffness(self, before: Stiffness | None) -> Stiffness | None:
+        """That of nodes that share an element, or a neighbour where pressures are of nodes. None with ties of skins."""
+        model = self.model
         if len(model.ties.slave):
             return None
-        place[model.joint_second[self.tied]] = model.joint_first[self.tied]
-        found = shared_elements([place[block.conn] for block in model.blocks], model.node_count)
+        found = shared_elements([block.conn for block in model.blocks], model.node_count)
         by_nodes = any(stage.nodal(slice(0, 1)) is not stage.no_nodes for stage in self.solver.elements)
-        return sparse.csr_array(found @ found) if by_nodes else found
+        pairs = np.stack([model.joint_first[self.tied], model.joint_second[self.tied]])
+        return Stiffness(self._apart, sparse.csr_array(found @ found) if by_nodes else found, pairs, before)
 
     def _free(self, u: Array) -> Array | None:
         """Motions without strain of the pieces, as `equilibrium` takes them."""
@@ -201,12 +198,17 @@ class Relaxation:
     def _forces(self, u: Array) -> Array:
         """Forces of the elements on the nodes [N]; nodes that follow others give these their forces."""
         first, second = self.model.joint_first[self.tied], self.model.joint_second[self.tied]
-        self._evaluate(self._followed(u))
+        force = self._apart(self._followed(u))
+        np.add.at(force, first, force[second])
+        force[second] = 0.0
+        return force
+
+    def _apart(self, u: Array) -> Array:
+        """The same where no node follows another one of a joint."""
+        self._evaluate(u)
         self._replay(self._push)
         inertia = np.where(self.model.mass > 0.0, self.model.mass, 1.0)  # as `Workspace.inverse_mass` divides
         force = self.model.ties.carried(inertia[:, None] * (self.trial.v.numpy() - self.model.gravity[0]))
-        force[first] += force[second]
-        force[second] = 0.0
         force[self.rigid] = 0.0
         return force
 

@@ -102,7 +102,7 @@ def plot_waves(
         top = scale * limit or 1.0
         value = scale * stress.T
         norm = LogNorm(top / 10.0**DECADES, top, clip=True)
-        image = axes.pcolormesh(1e6 * time, 1e3 * position, value, norm=norm, cmap="viridis", rasterized=True)
+        image = axes.pcolorfast(_edges(1e6 * time), _edges(1e3 * position), value, norm=norm, cmap="viridis")
         figure.colorbar(image, ax=axes, extend="both").set_label(f"von Mises [{unit}]")
         _draw_speeds(axes, path, speeds)
         axes.set_xlim(0.0, 1e6 * float(time[-1]))
@@ -112,6 +112,14 @@ def plot_waves(
     panels[-1].set_xlabel("time after first contact [µs]")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="upper center", ncols=3, frameon=False)
     return figure
+
+
+def _edges(centres: Array) -> Array:
+    """Between cells around increasing centres, shape (count + 1,); the outer cells are symmetric."""
+    if len(centres) < 2:
+        return centres[:1] + np.array([-0.5, 0.5])
+    inner = 0.5 * (centres[1:] + centres[:-1])
+    return np.concatenate([2.0 * centres[:1] - inner[:1], inner, 2.0 * centres[-1:] - inner[-1:]])
 
 
 def _with_gaps(path: PathHistory) -> tuple[Array, NDArray[np.floating]]:

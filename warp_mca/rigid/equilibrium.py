@@ -15,12 +15,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from warp_mca.base.errors import GuardError
 from warp_mca.rigid.body_motion import Motions
 from warp_mca.rigid.chain import Array
-from warp_mca.rigid.stiffness import colours, inverse, stiffness_matrix
+from warp_mca.rigid.factors import Inverse
+from warp_mca.rigid.stiffness import Stiffness
 
 Forces = Callable[[Array], Array]
 
@@ -30,7 +30,10 @@ PROBES = 12  # products with random signs for the diagonal
 DIFFERENCE = 1e-8  # largest displacement of a difference quotient, over the body's radius of inertia
 MIN_DELAY = 50  # iterations that tell what is still free to leave
 FACTORED_DELAY = 4  # the same with the inverse of K, which takes few iterations
-MOST_NODES, MOST_COLOURS = 20_000, 80  # with which K is found and factored; each colour takes three products
+RESTS = (
+    1e-2  # share of what may be left that the inverse of K says is left, where it may be of a body before it yielded
+)
+MOST_TURNED = 12  # iterations with factors of an earlier shape, of which a body has only turned if that is so few
 MAX_NEWTON = 20
 MAX_ITERATIONS = 20_000  # of conjugate gradients, in each linear step
 MAX_HALVINGS = 10
@@ -63,7 +66,7 @@ def equilibrium(
     held: NDArray[np.bool_] | None = None,
     name: str = "body",
     energy: Callable[[Array], float] | None = None,
-    pattern: sparse.csr_array | None = None,
+    stiffness: Stiffness | None = None,
     free: Array | None = None,
 ) -> Equilibrium:
     """Relax the displacements of one body until its internal forces balance.
@@ -82,15 +85,14 @@ def equilibrium(
         name: of the body, for messages.
         energy: strain energy of displacements, plastic work included [J], from the same history. Where elements yield
             and unload, a step may make it smaller, though not the forces; such a step is taken too.
-        pattern: entry (i, j) where the force on node i depends on the displacement of node j, shape (node_count,
-            node_count), for the inverse of K; without it its diagonal is taken.
+        stiffness: for the inverse of K, which is kept there; without it its diagonal is taken.
         free: fields of the motions without strain, shape (node_count, 3, motion_count), float64; those of a rigid body
             if None.
 
     Raises:
         GuardError: forces are not finite, or the search does not converge.
     """
-    search = _Search(forces, u, points, masses, held, name, energy, pattern, free)
+    search = _Search(forces, u, points, masses, held, name, energy, stiffness, free)
     u, residual = u.copy(), search.residual(u)
     released, drop, delay = 0.0, np.inf, 0
     for _ in range(MAX_NEWTON):
@@ -128,7 +130,7 @@ class _Search:
         held: NDArray[np.bool_] | None,
         name: str,
         energy: Callable[[Array], float] | None,
-        pattern: sparse.csr_array | None,
+        stiffness: Stiffness | None,
         free: Array | None,
     ) -> None:
         self._forces, self._masses, self._name, self._energy = forces, masses[:, None], name, energy
@@ -138,10 +140,10 @@ class _Search:
         motions = Motions(shape, masses @ shape / masses.sum(), masses, none if held is None else held)
         self._span, self._rigid = DIFFERENCE * motions.radius, motions.free() if free is None else free
         self._gram = np.linalg.inv(np.einsum("nck,n,ncl->kl", self._rigid, masses, self._rigid, optimize=True))
-        self.evaluations, self._diagonal, self._inverse, self._exact = 0, None, None, False
-        self._pattern = pattern
-        self._colour = colours(pattern) if pattern is not None and len(u) <= MOST_NODES else None
-        self._factors = self._colour is not None and self._colour.max() < MOST_COLOURS
+        self.evaluations, self._diagonal = 0, None
+        self._inverse: Inverse | None = None
+        self._points = points
+        self._kept = stiffness if stiffness and stiffness.small else None
 
     def residual(self, u: Array) -> Array:
         """Forces that deform [N]: without those on held axes, and without net force and moment on free motions.
@@ -156,18 +158,20 @@ class _Search:
     def _internal(self, u: Array) -> Array:
         """Forces [N], without those on held axes."""
         self.evaluations += 1
-        force = self._loose * self._forces(u)
+        return self._finite(self._loose * self._forces(u))
+
+    def _finite(self, force: Array) -> Array:
         if not np.isfinite(force).all():
             raise GuardError(f"the internal forces of {self._name} became infinite while its shape at rest was sought")
         return force
 
     def rests(self, u: Array, residual: Array, elastic_energy: float) -> bool:
         """Whether forces are so small that next to no energy [J] is free to leave, in however slender a body."""
-        if self._factors and self._inverse is None:
-            self._factor(u)
+        if self._kept and self._inverse is None:
+            self._factor(u, self._kept)
         if self._exact:  # a step more takes few evaluations
             free = 0.5 * float((residual * self._precondition(u, residual, residual)).sum())
-            return free <= 1e-3 * TOLERANCE * elastic_energy
+            return free <= 0.1 * RESTS * TOLERANCE * elastic_energy
         return self._diagonal is not None and CONDITION * self._size(residual) <= TOLERANCE * elastic_energy
 
     def linear_step(self, u: Array, residual: Array, enough: float, delay: int) -> tuple[Array, float, int]:
@@ -182,7 +186,8 @@ class _Search:
         step, r, start = np.zeros_like(u), residual, residual
         z, delay = self._precondition(u, start, r), max(delay, FACTORED_DELAY if self._exact else MIN_DELAY)
         p, rz, drops = z, float((r * z).sum()), []
-        for _ in range(MAX_ITERATIONS):
+        turned = self._inverse is not None and self._inverse.turned
+        for _ in range(MOST_TURNED if turned else MAX_ITERATIONS):
             Kp = self._stiffness(u, start, p)
             curvature = float((p * Kp).sum())
             if curvature <= 0.0 or rz <= 0.0:
@@ -190,11 +195,17 @@ class _Search:
             a = rz / curvature
             step, r = step + a * p, r - a * Kp
             drops.append(0.5 * a * rz)
-            if len(drops) >= delay and sum(drops[-delay:]) <= max(enough, 1e-4 * sum(drops)):
+            least = max(enough, 1e-4 * sum(drops))
+            if len(drops) >= delay and sum(drops[-delay:]) <= least:
                 return step, sum(drops), len(drops)
             z = self._precondition(u, start, r)
             before, rz = rz, float((r * z).sum())
+            if self._exact and 0.5 * rz <= RESTS * least:
+                return step, sum(drops), len(drops)
             p = z + (rz / before) * p
+        if turned and self._kept:
+            self._factor(u, self._kept, anew=True)
+            return self.linear_step(u, residual, enough, delay)
         if drops and self._inverse:  # K differs with the direction where elements yield: a Newton step more finds it
             return step, sum(drops) if self._exact else np.inf, len(drops)
         if len(drops) < MAX_ITERATIONS:
@@ -232,24 +243,32 @@ class _Search:
         rigid = self._gram @ np.einsum("nck,nc->k", self._rigid, self._masses * z)
         return z - self._loose * (self._rigid @ rigid)
 
-    def _factor(self, u: Array) -> None:
-        """Find K at u and its factors."""
-        assert self._pattern is not None and self._colour is not None
-        start = self._internal(u)
+    @property
+    def _exact(self) -> bool:
+        return self._inverse is not None and self._inverse.exact
+
+    def _factor(self, u: Array, stiffness: Stiffness, anew: bool = False) -> None:
+        """Find the inverse of K at u, and the diagonal of K; `anew`: by factors of this u."""
+        first, second = stiffness.pairs
+        loose = self._loose.copy()
+        loose[second] = loose[first]
+
+        def forces(u: Array) -> Array:
+            self.evaluations += 1
+            return self._finite(loose * stiffness.forces(u))
+
+        start = forces(u)
 
         def product(p: Array) -> Array:
-            return (start - self._internal(u + self._span * self._loose * p)) / self._span
+            return (start - forces(u + self._span * loose * p)) / self._span
 
-        K = stiffness_matrix(product, self._pattern, self._colour)
-        nodal = K.diagonal().reshape(-1, 3).sum(axis=1) / np.maximum(self._loose.sum(axis=1), 1.0)
-        typical = float(np.median(np.abs(nodal[self._loose.any(axis=1)])))
-        if typical == 0.0:
-            raise self.failure("it has no stiffness")
+        self._inverse = stiffness.inverse(product, self._points + u, anew)
+        if self._inverse is None:
+            self._kept = None
+            return
+        nodal = self._inverse.trace / np.maximum(self._loose.sum(axis=1), 1.0)
+        typical = float(np.median(nodal[self._loose.any(axis=1)]))
         self._diagonal = np.maximum(nodal, 1e-2 * typical)[:, None]
-        found = inverse(K)
-        self._factors = found is not None
-        if found:
-            self._inverse, self._exact = found
 
     def _estimate_diagonal(self, u: Array, start: Array) -> Array:
         """Diagonal of K, mean of a node's axes [N/m], shape (node_count, 1), float64.

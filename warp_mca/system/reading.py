@@ -10,7 +10,7 @@ from typing import Any
 import warp as wp
 from numpy.typing import NDArray
 
-_READ: ContextVar[dict[int, tuple[wp.array, NDArray[Any]]] | None] = ContextVar("read", default=None)
+_READ: ContextVar[dict[tuple[int, object], tuple[wp.array, NDArray[Any]]] | None] = ContextVar("read", default=None)
 
 
 @contextmanager
@@ -23,11 +23,12 @@ def read_once() -> Iterator[None]:
         _READ.reset(token)
 
 
-def on_host(array: wp.array) -> NDArray[Any]:
-    """The entries of an array, not to be written to; in `read_once` as they were when first asked for."""
-    read = _READ.get()
-    if read is None:
-        return array.numpy()
-    if id(array) not in read:
-        read[id(array)] = array, array.numpy()  # kept too: the id of one that is gone may be that of the next
-    return read[id(array)][1]
+def on_host(array: wp.array, rows: slice | None = None) -> NDArray[Any]:
+    """The entries of an array, or some rows, not to be written to; in `read_once` as they were when first asked for."""
+    read, key = _READ.get(), (id(array), rows and (rows.start, rows.stop, rows.step))
+    if read is None or key not in read:
+        found = (array if rows is None else array[rows]).numpy()
+        if read is None:
+            return found
+        read[key] = array, found  # kept too: the id of one that is gone may be that of the next
+    return read[key][1]

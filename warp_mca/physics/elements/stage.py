@@ -20,6 +20,7 @@ from warp_mca.kernels.loads import thermal
 from warp_mca.kernels.materials.laws import ROWS, law_functions, row_count
 from warp_mca.physics.elements.failing import failing_of
 from warp_mca.physics.elements.state import ElementState
+from warp_mca.system.reading import on_host
 from warp_mca.system.threads import ELEMENTS, Split, whole
 
 if TYPE_CHECKING:
@@ -246,8 +247,8 @@ class ElementStage:
         row, size = self.law.plastic_row, self.law.size
         if row < 0 or not self.points or part.start == part.stop:
             return 0.0
-        history = state.elements[self.index].history
-        return float(history[row : self.points * size : size, part].numpy().max())
+        found = on_host(state.elements[self.index].history, slice(row, self.points * size, size))
+        return float(found[:, part].max())
 
 
 def gather_lists(stages: Sequence[ElementStage], node_count: int) -> tuple[Index, Index]:
