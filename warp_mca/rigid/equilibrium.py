@@ -30,9 +30,7 @@ PROBES = 12  # products with random signs for the diagonal
 DIFFERENCE = 1e-8  # largest displacement of a difference quotient, over the body's radius of inertia
 MIN_DELAY = 50  # iterations that tell what is still free to leave
 FACTORED_DELAY = 4  # the same with the inverse of K, which takes few iterations
-RESTS = (
-    1e-2  # share of what may be left that the inverse of K says is left, where it may be of a body before it yielded
-)
+RESTS = 1e-2  # share of what may be left that the inverse of K says is left, which may be that before bodies yielded
 MOST_TURNED = 12  # iterations with factors of an earlier shape, of which a body has only turned if that is so few
 MAX_NEWTON = 20
 MAX_ITERATIONS = 20_000  # of conjugate gradients, in each linear step

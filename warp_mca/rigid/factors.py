@@ -180,7 +180,8 @@ def _body(K: sparse.bsr_array, inner: Nodes, ends: Nodes) -> Body | None:
     )
     lower = np.flatnonzero((columns >= 0) & (rows >= columns) & (rows < count))
     i, j = rows[lower], columns[lower]
-    if not count or float(3 * (i - j).max() + 3) ** 2 * 3 * count > MOST_WORK:
+    band = float(3 * (i - j).max() + 3) if count else 0.0
+    if not count or 3 * count * band * (band + 6 * len(ends)) > MOST_WORK:  # of the factors, and of Y
         return body
     piece = i, j, np.asarray(K.data[lower], dtype=np.float64), stiff[:count].ravel()
     found = next(filter(None, (_factors(_band(*piece), shift) for shift in SHIFTS)), None)
