@@ -191,8 +191,11 @@ def spring_function(friction: bool, laws: Laws) -> Any:
             F, W = law_force(-gap, k_old, spring.parameters, s), law_energy(-gap, k_old, spring.parameters, s)
             c, aside, owed, spent = pay(s, F, W, k_old, force_old, tangential, du, normal, slip, spring)
             Fn += c
+        dashpots = wp.float64(0.0)
         if wp.static(damped):
+            dashpots = spring.dashpot[s][0]
             Fn, dissipated = damp(s, Fn, -gap, normal, du, k, force_old - tangential, dt, spring)
+            dashpots += spring.dashpot[s][0]
             spent += dissipated
         share = wp.float64(1.0)
         if k < k_old:
@@ -215,8 +218,8 @@ def spring_function(friction: bool, laws: Laws) -> Any:
             if stick == 1 and mu > wp.float64(0.0):  # a scene of a batch may have no friction
                 spring.stick_impulse[s] = stick_impulse + Fn
         made = energy_made(force_old, energy_old, force, energy, spent, du)
-        if wp.static(laws.pressed):  # work that brings the overlap in, of the forces at both ends of the step
-            given = half * (wp.length(force_old - tangential) + Fn) * spring.pressed[s][1]
+        if wp.static(laws.pressed):  # work on the spring that brings the overlap in, of both ends of the step
+            given = half * (wp.length(force_old - tangential) + Fn - dashpots) * spring.pressed[s][1]
             made -= given
             spring.drive[s] = spring.drive[s] + given
         if wp.static(friction):
