@@ -115,7 +115,7 @@ def dent(degrees: float, x: float, turn: float, cells: int) -> mca.Scene:
     points[:, 1] += abs(points[:, ::2]).sum(axis=1) * slope * (1.0 + points[:, 1] / 0.006)
     down = Rotation.align_vectors([[0.0, -1.0, 0.0]], [[1.0, 1.0, 1.0]])[0]
     pose = Rotation.from_rotvec([0.0, turn, 0.0]) * down
-    box = mca.Box(size=(2.0 * half,) * 3, divisions=(cells,) * 3, origin=(-half,) * 3)
+    box = mca.Box(size=(0.006, 0.006, 0.006), divisions=(cells, cells, cells), origin=(-half, -half, -half))
     cube = mca.Body(
         name="cube",
         geometry=box,
