@@ -184,27 +184,22 @@ def spring_function(friction: bool, laws: Laws) -> Any:
         impulse, normal_impulse, depth = spring.impulse[s], spring.normal_impulse[s], spring.depth[s]
         made_before, force_old, energy_old = spring.made[s], spring.force[s], spring.energy[s]
         tangential, friction_work, stick_impulse = friction_before(s, spring)
-        half = wp.float64(0.5)
+        half, share, owed = wp.float64(0.5), wp.float64(1.0), wp.float64(0.0)
+        spent, dashpots, aside = wp.float64(0.0), wp.float64(0.0), wp.vec3d()
         Fn, stored = law_force(-gap, k, spring.parameters, s), law_energy(-gap, k, spring.parameters, s)
-        owed, spent, aside = wp.float64(0.0), wp.float64(0.0), wp.vec3d()  # `aside` lies across the normal
         if wp.static(laws.returns):
             F, W = law_force(-gap, k_old, spring.parameters, s), law_energy(-gap, k_old, spring.parameters, s)
             c, aside, owed, spent = pay(s, F, W, k_old, force_old, tangential, du, normal, slip, spring)
             Fn += c
-        dashpots = wp.float64(0.0)
         if wp.static(damped):
             dashpots = spring.dashpot[s][0]
             Fn, dissipated = damp(s, Fn, -gap, normal, du, k, force_old - tangential, dt, spring)
             dashpots += spring.dashpot[s][0]
             spent += dissipated
-        share = wp.float64(1.0)
         if k < k_old:
             share, lost = soften(s, gap, normal, du, k_old, k, spring)
             spent += lost
-        force = Fn * normal
-        if wp.static(laws.returns):
-            force += aside
-        energy = stored + owed
+        force, energy = Fn * normal + aside, stored + owed  # `aside` lies across the normal
         if wp.static(friction):
             limit = mu * Fn
             if wp.static(by_laws):
