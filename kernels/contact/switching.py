@@ -16,7 +16,6 @@ from warp_mca.kernels.contact.balance import energy_made
 from warp_mca.kernels.contact.friction import release
 
 SHARE = 0.05  # greatest force that returns energy, over the force of a pressed spring
-ASIDE = 0.5  # the same across a normal that has turned, or over what the last force has across it, if less
 PULL = 0.1  # the same over k times the motion of a step
 IDLE = 1e-3  # debt that rests, over the energy of a pressed spring
 LEAST = 1e-6  # debt that counts as returned once a spring is open, over k times the square of that motion
@@ -104,8 +103,7 @@ def pay(
             if left < zero and size > wp.float64(wp.static(TURNS)) * wp.length(pressure):
                 turn = turn / size
                 out = wp.dot(du, turn)
-                most = wp.max(owed[2] * F, wp.float64(wp.static(ASIDE)) * wp.min(size, F))
-                aside = returning(left, out, most) * turn
+                aside = returning(left, out, owed[2] * F) * turn
                 left -= half * wp.dot(aside, du)
             else:
                 c = returning(left, out, owed[2] * F)
