@@ -68,6 +68,10 @@ class Prepared:
     masses: Mapping[str, Mapping[str, float | None]] | None = None
     room: Room | None = None
 
+    def stress_room(self) -> NDArray[np.float32] | None:
+        """Memory for first rows of its stress [Pa], shape (row_count, probe_count, 6), float32, where there is some."""
+        return self.room.take(len(self.probes.corner)) if self.room else None
+
     def with_model(self, model: Model) -> Prepared:
         """With other passes of contact; it has no home where one is another, or becomes another in the run."""
         passes = [id(item) for item in self.model.passes]

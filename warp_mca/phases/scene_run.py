@@ -88,8 +88,7 @@ class SceneRun:
         tolerance, framed = ready.scene.impact.energy_tolerance, solver.floating.count > 0
         self.ledger = Ledger(ready.model, steps, tolerance, solver.precision, state.scenes[index], framed)
         self.looks = SceneLooks(solver, self.ledger, watch, index, ready.home)
-        room = ready.room.take(len(ready.probes.corner)) if ready.room else None
-        self.stress = StressRows(self.ledger.kept, steps.checks, self.probes, room)
+        self.stress = StressRows(self.ledger.kept, steps.checks, self.probes, ready.stress_room())
 
     def read(self, written: int, records: Mapping[str, NDArray]) -> None:
         """Take in the first `written` of the solver's records.
