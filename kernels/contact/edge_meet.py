@@ -123,7 +123,8 @@ def begin_crossing(
         begins = lies_clear(X, u, slave, a, master, b, hit.weight[1], size)
     if begins and not first_touch:
         begins = lies_clear(X, u, master, b, slave, a, hit.weight[3], size)
-    return begins, rest
+    # no more compression than the step explains: springs that begin with more make energy
+    return begins, wp.max(rest, -hit.gap - wp.max(hit.approach, wp.float64(0.0)))
 
 
 @wp.func

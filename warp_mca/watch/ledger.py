@@ -152,7 +152,7 @@ class Ledger:
             "hourglass": sums[..., HOURGLASS],
             "contact": springs[..., SPRING_ENERGY].sum(axis=-1),
             "friction": springs[..., FRICTION].sum(axis=-1),
-            "contact_loss": springs[..., LOST].sum(axis=-1),
+            "contact_loss": np.maximum(springs[..., LOST].sum(axis=-1), 0.0),  # springs that begin with more made it
             "damping": springs[..., DAMPED].sum(axis=-1) + sums[..., VISCOUS] + sums[..., -1],
             "joint": sums[..., JOINT_HEAT],
             "absorbed": np.zeros(sums.shape[:-1]),
