@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 Product = Callable[[Array], Array]
 
 MOST_NODES, MOST_COLOURS = 20_000, 80  # with which K is found and factored; each colour takes three products
-MOST_JOINTS = 16  # nodes: each takes three solutions
+MOST_JOINTS = 100  # nodes: each takes three solutions
 
 
 class Stiffness:
