@@ -129,11 +129,6 @@ class Helpers:
         answered = select.select(self._all, [], [], 0.0)[0]
         return sum(helper.process.poll() is None and (helper.begun or helper in answered) for helper in self._all)
 
-    @property
-    def started(self) -> bool:
-        """Whether there are any that still know what this process knows, also such as have not begun."""
-        return self._where == _surroundings() and any(helper.process.poll() is None for helper in self._all)
-
     def carry_out(
         self,
         function: Callable[..., T],
@@ -142,7 +137,6 @@ class Helpers:
         here: Callable[[int], T],
         count: int,
         told: Callable[[int, T], None] = lambda k, answer: None,
-        wait: float = 0.0,
     ) -> list[T]:
         """What `function` returns for the pickled arguments of each job, `here(k)` being the same for job k.
 
@@ -155,7 +149,6 @@ class Helpers:
             here: what this process calls in place of `function`.
             count: of helpers.
             told: of each job that is done, and what came of it.
-            wait: for the first helper to begin, before this process computes [s].
 
         Raises:
             Exception: what `here` raises for the first of the jobs that fail.
@@ -163,7 +156,7 @@ class Helpers:
 
         self.by = {}
         try:
-            answers = self._answers(jobs, lambda k: message(function, data(k)), here, count, told, wait)
+            answers = self._answers(jobs, lambda k: message(function, data(k)), here, count, told)
         except BaseException:
             self.end()
             raise
@@ -182,7 +175,6 @@ class Helpers:
         here: Callable[[int], T],
         count: int,
         told: Callable[[int, T], None],
-        wait: float,
     ) -> dict[int, T]:
         self.begin(count)
         left, answers = deque(range(jobs)), {}
@@ -191,8 +183,7 @@ class Helpers:
             self._next(helper, message, left, busy)
         while left or any(k is not None for asked in busy.values() for k in asked):
             begun = any(helper.begun for helper in busy)
-            answered, wait = select.select(list(busy), [], [], None if begun else wait)[0], 0.0
-            for helper in answered:
+            for helper in select.select(list(busy), [], [], None if begun else 0.0)[0]:
                 k = busy[helper].popleft()
                 try:
                     found = helper.answer()

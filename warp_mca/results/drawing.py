@@ -12,7 +12,6 @@ from warp_mca.results.result import Result
 MOST_BYTES = 64 << 20  # of a result for helpers: each gets all of it
 IMPORTED = ("matplotlib.backends.backend_agg", "matplotlib.figure", "scipy.ndimage")  # these take long
 HELPERS = Helpers(__name__, *IMPORTED)
-WAIT = 0.5  # for helpers to begin [s]: this process has yet to import what they do
 MOST = 4  # helpers: a scene with paths has as many figures
 
 
@@ -31,7 +30,7 @@ def draw_figures(result: Result, folder: Path) -> None:
     """
     names = [*(["waves.png", "paths.png"] if result.paths else []), "forces.png", "energies.png"]  # longest first
     names += ["probes.png"] if result.probes or result.sections else []
-    packed = _packed(result) if HELPERS.started else None
+    packed = _packed(result) if HELPERS.count else None
     if packed is None:
         for name in names:
             _draw(name, result, folder)
@@ -40,7 +39,7 @@ def draw_figures(result: Result, folder: Path) -> None:
     def data(k: int) -> bytes:
         return pickle.dumps((names[k], packed, str(folder)))
 
-    HELPERS.carry_out(draw_one, len(names), data, lambda k: _draw(names[k], result, folder), 0, wait=WAIT)
+    HELPERS.carry_out(draw_one, len(names), data, lambda k: _draw(names[k], result, folder), HELPERS.count)
 
 
 def _packed(result: Result) -> bytes | None:
