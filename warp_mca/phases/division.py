@@ -16,6 +16,7 @@ from warp_mca.system.model import Model
 # Speeds may grow to so many times that of the fastest node, or that at which nodes approach each other, before one can
 # outrun the contact search between two passes.
 SPEED_RESERVE = 4.0
+GENERAL_RESERVE = 10.0  # the same in general contact: a light node between two bodies got 9 times the speed of a drop
 # Times that reserve where a search holds for several intervals, each of which may have one at little cost: the loose
 # cover of a phone got 4.5 times the speed of its fall.
 _LOOSE = 2.0
@@ -63,10 +64,15 @@ def divide_alike(parts: Sequence[tuple[Scene, Model]], duration: float, substeps
 def coarser(steps: Steps, model: Model, rows: int, intervals: int, speed: float) -> Steps:
     """The same time step in intervals of so many `rows`, with searches for contact that a `speed` [m/s] needs."""
     margins = [item.margin for item in model.passes if item.plane is None]
-    needed = SPEED_RESERVE * speed * rows * steps.interval / (0.5 * min(margins)) if margins else 1.0
+    needed = _reserve(model) * speed * rows * steps.interval / (0.5 * min(margins)) if margins else 1.0
     most = rows * steps.searches
     joined = max(k for k in range(1, most + 1) if most % k == 0 and (k == 1 or most // k >= needed))
     return Steps(steps.dt, per_search=steps.per_search * joined, searches=most // joined, intervals=intervals)
+
+
+def _reserve(model: Model) -> float:
+    """Times the greatest speed that searches for contact allow for [-]."""
+    return GENERAL_RESERVE if any(item.pairs is not None for item in model.passes) else SPEED_RESERVE
 
 
 def _limits(scene: Scene, model: Model, interval: float, intervals: int) -> tuple[float, float]:
@@ -104,9 +110,10 @@ def _limits(scene: Scene, model: Model, interval: float, intervals: int) -> tupl
         remedy = f"in a step some nodes would move {apart:.3g} m more than others; check the unit [m/s or rad/s]"
         raise bad_value("speed of the bodies", speed, remedy)
     margins = [item.margin for item in model.passes if item.plane is None]
-    searches = SPEED_RESERVE * fastest * interval / (0.5 * min(margins)) if margins else 1.0
+    reserve = _reserve(model)
+    searches = reserve * fastest * interval / (0.5 * min(margins)) if margins else 1.0
     if margins and (pushed := load_speed(model, interval * intervals)):
-        searches += min(SPEED_RESERVE * pushed * interval / (0.5 * min(margins)), interval / stable)
+        searches += min(reserve * pushed * interval / (0.5 * min(margins)), interval / stable)
     if not searches * intervals <= MAX_STEPS:
         remedy = f"so fast, a run would search for contact more than {MAX_STEPS:.0e} times; check the unit [m/s]"
         raise bad_value("speed of the bodies", max(float(np.abs(model.V).max()), driven), remedy)
