@@ -15,14 +15,13 @@ from warp_mca.base.rotation import best_rotation
 from warp_mca.geometry.cell_types import triangulated
 from warp_mca.kernels.contact import crossing
 from warp_mca.kernels.contact.inside import depths_inside
+from warp_mca.watch.skin_shape import shape_of
 
 Found = tuple[float, Array]  # depth [m] and place [m], shape (3,)
 
 INWARD = 0.02  # of its shortest edge, by which a node is moved into its body: skins that only touch do not cross
 FLAT = 0.1  # of the body's thickness, which that does not exceed
-THIN = 0.05  # quantile of distances through a body that counts as its thickness: at sharp edges it has none
 SAMPLES = 2048  # points of a skin that are looked for in another body, evenly spread, where edges lie in it
-RAYS = 2048  # through a body and away from it, evenly spread over its triangles
 SHAPE_NODES = 1024  # of a body that tell how far it is out of shape, evenly spread
 _KEPT: Kept[tuple[Index, Index, Index]] = Kept(500_000)  # triangles of skins of this process, 25 MB of memory
 NOWHERE: Found = (0.0, np.full(3, np.nan))
@@ -96,11 +95,7 @@ class Skin:
         nodes: of its surface, in the numbering of the scene's model, shape (node_count,), int32.
         triangle: of faces and halves of faces, shape (triangle_count, 3), int32, by position in `nodes`.
         edge: of the triangles, each once, shape (edge_count, 2), int32, by position in `nodes`.
-        width: of a face, median [m].
-        longest: longest edge [m].
-        thickness: of the thin parts of the body [m].
-        gap: least distance over which its faces see others of it from outside [m]; inf where they see none.
-        extents: of the body along its principal axes, from the least to the greatest [m], shape (3,), float64.
+        width, longest, thickness, gap, extents: at the start, as `SkinShape` has them.
         x: where the nodes are [m], shape (node_count, 3), float64.
     """
 
@@ -109,20 +104,12 @@ class Skin:
         self.name, (own, self.triangle, self.edge) = name, _parts(faces)
         self.nodes = (own + start).astype(np.int32)
         self.X = X[self.nodes]
-        length = np.linalg.norm(self.X[self.edge[:, 0]] - self.X[self.edge[:, 1]], axis=1)
-        self.longest = float(length.max())
-        self._shortest = np.full(len(own), np.inf)
-        np.minimum.at(self._shortest, self.edge.ravel(), np.repeat(length, 2))
-        a, b, c = (self.X[self.triangle[:, k]] for k in range(3))
-        normal = np.cross(b - a, c - a)
-        self.width = float(np.sqrt(np.median(np.linalg.norm(normal, axis=1))))
-        centred = self.X - self.X.mean(axis=0)
-        self.extents = np.sort(np.ptp(centred @ np.linalg.eigh(centred.T @ centred)[1], axis=0))
+        shape = shape_of(self.X, self.triangle, self.edge)
+        self.width, self.longest, self._shortest = shape.width, shape.longest, shape.shortest
+        self.thickness, self.gap, self.extents = shape.thickness, shape.gap, shape.extents
         self._origin = self.X.mean(axis=0)
         self.x, self._stale = self.X, False
         self._searches: dict[Skin, _EdgeSearch] = {}
-        some = slice(None, None, -(-len(normal) // RAYS))
-        self.thickness, self.gap = self._distances(((a + b + c) / 3.0)[some], normal[some])
 
     def __getstate__(self) -> dict[str, Any]:
         """For another process, without what Warp has of it, which is made anew where it is looked at."""
@@ -150,24 +137,6 @@ class Skin:
         # how far each node is moved into the body [m], shape (node_count,), float32
         inward = np.minimum(INWARD * self._shortest, FLAT * self.thickness).astype(np.float32)
         return _Settling(self._mesh, self._triangle, wp.array(inward, dtype=wp.float32, device="cpu"))
-
-    def _distances(self, middle: Array, normal: Array) -> tuple[float, float]:
-        """Thickness and gap, by rays from the middles of triangles along their normals, inwards and outwards."""
-        reach = float(np.linalg.norm(self.extents))
-        unit = normal / np.linalg.norm(normal, axis=1, keepdims=True)
-        found = []
-        for sign in (-1.0, 1.0):
-            ahead = 1e-5 * reach * sign
-            origin = (middle - self._origin + ahead * unit).astype(np.float32)
-            start = wp.array(origin, dtype=wp.vec3f, device="cpu")
-            direction = wp.array((sign * unit).astype(np.float32), dtype=wp.vec3f, device="cpu")
-            length = wp.zeros(len(middle), dtype=wp.float32, device="cpu")
-            inputs = [self._mesh.id, start, direction, reach]
-            wp.launch(crossing.ray_lengths, len(middle), inputs=inputs, outputs=[length], device="cpu")
-            found.append(length.numpy().astype(float))
-        inward = min(float(np.quantile(found[0], THIN)), self.extents[0])
-        outward = float(found[1].min())
-        return inward, outward if outward < 0.99 * reach else np.inf  # in float32
 
     def move(self, x: Array) -> None:
         """Take the place of its nodes [m], shape (node_count, 3), float64."""
