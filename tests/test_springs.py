@@ -359,6 +359,7 @@ def test_the_summary_lists_springs():
         ({"other_at": None}, r"Spring s.other_at = None: give its place"),
         ({"other_nodes": "xmax"}, r"Spring s.other_nodes = 'xmax': the ground has none"),
         ({"other": "b", "other_at": None}, r"Spring s.other_at = None: give either a point by other_at="),
+        ({"length": -0.1}, r"Spring s.length = -0.1: points are never so near"),
         ({"direction": (0.0, 0.0, 0.0)}, r"Spring s.direction = \(0.0, 0.0, 0.0\): give a direction other than zero"),
         ({"elongations": (0.0, 1.0), "forces": (0.0, 1.0)}, r"Spring s.stiffness = 100.0: leave it out"),
         ({"stiffness": 0.0, "elongations": (0.0, 1.0), "forces": (0.0,)}, r"Spring s.forces = \(0.0,\): give two"),
@@ -377,8 +378,8 @@ def test_springs_that_are_none_are_refused(given: dict, message: str):
         ((SPRING, SPRING), r"Spring.name = 's': another spring has it"),
         ((replace(SPRING, other_at=CENTRE),), r"Spring s.direction = None: its points lie in one place"),
         ((replace(SPRING, at=(1.0, 0.0, 0.0)),), r"Spring s.at = \(1.0, 0.0, 0.0\): this point lies .* m outside"),
-        ((replace(SPRING, other="c"),), r"Spring.other = 'c': the scene's bodies are a"),
-        ((replace(SPRING, at=None, nodes="none"),), r"Spring.nodes of body a, node set = 'none'"),
+        ((replace(SPRING, other="c"),), r"Spring s.other = 'c': the scene's bodies are a"),
+        ((replace(SPRING, at=None, nodes="none"),), r"Spring s.nodes of body a, node set = 'none'"),
     ],
 )
 def test_springs_that_do_not_fit_are_refused(springs: tuple, message: str):

@@ -73,11 +73,6 @@ class Bolt(Load):
             validate.within(self.title, 1e-9, 1e6, reach=self.reach)
 
     @property
-    def title(self) -> str:
-        """How errors name it."""
-        return f"Bolt {self.name}"
-
-    @property
     def is_constant(self) -> bool:
         """It knows no time."""
         return True

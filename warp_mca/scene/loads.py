@@ -46,8 +46,14 @@ class Load:
 
     @property
     def title(self) -> str:
-        """Its kind and its body, for errors."""
-        return f"{type(self).__name__} of {self.body}"
+        """Its kind and its name, or its body, for errors."""
+        return f"{type(self).__name__} of {self.body}" if self.label == type(self).__name__ else self.label
+
+    @property
+    def label(self) -> str:
+        """The same without its body, for errors about that."""
+        name = getattr(self, "name", None)
+        return type(self).__name__ if name is None else f"{type(self).__name__} {name}"
 
     @property
     def is_constant(self) -> bool:

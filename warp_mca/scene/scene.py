@@ -202,7 +202,7 @@ class Scene:
 
     def _named_bodies(self) -> list[tuple[str, str]]:
         named = [(f"{type(item).__name__}.body", item.body) for item in (*self._held, *self.masses)]
-        named += [(f"{type(load).__name__}.{key}", body) for load in self.loads for key, body in load.bodies().items()]
+        named += [(f"{load.label}.{key}", body) for load in self.loads for key, body in load.bodies().items()]
         named += [(f"{item.title}.body", item.body) for item in self.joints]
         named += [(f"{item.title}.other", item.other) for item in self.joints if item.other is not None]
         named += [(f"{field}.body", surface.body) for field, surface in self._surfaces()]
@@ -220,7 +220,7 @@ class Scene:
         named = [
             (f"{type(item).__name__}.nodes", item.body, item.nodes, isinstance(item, Absorbing)) for item in self._held
         ]
-        named += [(f"{type(load).__name__}.{key}", *own) for load in self.loads for key, own in load.sets().items()]
+        named += [(f"{load.label}.{key}", *own) for load in self.loads for key, own in load.sets().items()]
         for joint in self.acting_joints:
             named += [(f"{joint.title}.{key}", *own, False) for key, own in joint.sets().items()]
         named += [(f"{field}.nodes", surface.body, surface.nodes, True) for field, surface in self._surfaces()]

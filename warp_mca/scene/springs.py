@@ -69,6 +69,9 @@ class Spring(Load):
         self._check_points()
         if self.length is not None:
             validate.within(self.title, -1e9, 1e9, length=self.length)
+            if self.length < 0.0 and self.direction is None:
+                remedy = "points are never so near; give 0 or more, or the direction along which it is measured"
+                raise bad_value(f"{self.title}.length", self.length, remedy)
         if self.direction is not None:
             validate.directions(self.title, direction=self.direction)
         for number, x, y in (("stiffness", "elongations", "forces"), ("damping", "speeds", "damping_forces")):
@@ -113,11 +116,6 @@ class Spring(Load):
         if number == "damping" and not (resists and float(np.interp(0.0, xs, ys)) == 0.0):
             remedy = "a dashpot resists: give tension at speeds above 0, negative below, and none at 0"
             raise bad_value(f"{self.title}.{y}", ys, remedy)
-
-    @property
-    def title(self) -> str:
-        """How errors name it."""
-        return f"Spring {self.name}"
 
     @property
     def is_constant(self) -> bool:
