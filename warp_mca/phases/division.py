@@ -16,7 +16,7 @@ from warp_mca.system.model import Model
 # Speeds may grow to so many times that of the fastest node, or that at which nodes approach each other, before one can
 # outrun the contact search between two passes.
 SPEED_RESERVE = 4.0
-GENERAL_RESERVE = 10.0  # the same in general contact: a light node between two bodies got 9 times the speed of a drop
+EDGE_RESERVE = 16.0  # the same at sharp edges, which throw light nodes: one got 9 times the speed of a phone's fall
 # Times that reserve where a search holds for several intervals, each of which may have one at little cost: the loose
 # cover of a phone got 4.5 times the speed of its fall.
 _LOOSE = 2.0
@@ -72,7 +72,7 @@ def coarser(steps: Steps, model: Model, rows: int, intervals: int, speed: float)
 
 def _reserve(model: Model) -> float:
     """Times the greatest speed that searches for contact allow for [-]."""
-    return GENERAL_RESERVE if any(item.pairs is not None for item in model.passes) else SPEED_RESERVE
+    return EDGE_RESERVE if any(item.sides > 1 for item in model.passes) else SPEED_RESERVE
 
 
 def _limits(scene: Scene, model: Model, interval: float, intervals: int) -> tuple[float, float]:
