@@ -356,7 +356,7 @@ def test_a_search_that_holds_for_several_intervals_lets_bodies_get_eight_times_a
 
 
 def test_searches_at_sharp_edges_allow_for_nodes_that_these_throw():
-    """Such a node got 9 times the speed of a phone that fell on its corner, and 11 right runs of 1,000 were stopped."""
+    """Such a node got 9 times the speed of a phone that fell on its corner; the run was right, and was stopped."""
     scene = two_boxes()
     (contact,) = scene.contacts
     skins = replace(
