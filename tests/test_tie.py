@@ -244,9 +244,11 @@ def test_a_slave_may_be_fixed_where_all_its_masters_are():
     assert (impact.state.u.numpy()[low, 1] == 0.0).all()
 
 
-def test_slaves_are_put_on_the_faces():
-    model = prepared(bar(apart=1e-4)).model
-    assert model.X[model.ties.slave, 0] == pytest.approx(1e-4, rel=1e-12)
+@pytest.mark.parametrize("apart", [1e-4, -1e-4])
+def test_slaves_are_put_on_the_faces_and_bodies_keep_their_mass(apart):
+    model = prepared(bar(apart=apart)).model
+    assert model.X[model.ties.slave, 0] == pytest.approx(apart, rel=1e-12)
+    assert model.mass.sum() == pytest.approx(2.0 * SOFT.rho * SIDE**3, rel=1e-12)
 
 
 def test_points_project_on_skew_faces_and_triangles():

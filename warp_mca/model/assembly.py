@@ -20,6 +20,7 @@ from warp_mca.physics.elements.cells import (
     body_materials,
     densities,
     element_masses,
+    kept_mass,
     own_masses,
     point_masses,
     sum_to_nodes,
@@ -65,6 +66,10 @@ class Assembly(Bodies):
         self.K = np.array([m.bulk_modulus for m in self.materials])[self.material]
         self.G = np.array([m.shear_modulus for m in self.materials])[self.material]
         self.rho = np.concatenate([densities(body, meshes[body.name]) for body in scene.bodies])
+        for body in scene.bodies:
+            mesh, own, first = meshes[body.name], self.all_nodes(body.name), self.element_start[body.name]
+            rho = self.rho[first : first + mesh.cell_count]
+            rho *= kept_mass(body, mesh, self.shape[own], self.X[own], rho)
         self.volume, self.face_depth, self.face_height = np.empty(elements), np.ones(elements), np.ones(elements)
         self.mass = np.zeros(nodes)
         self.element_mass = []

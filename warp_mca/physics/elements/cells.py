@@ -122,6 +122,21 @@ def sum_to_nodes(conn: Index, value: Array, node_count: int) -> Array:
     return np.bincount(conn.ravel(), value.ravel(), minlength=node_count).astype(np.float64)
 
 
+def kept_mass(body: Body, mesh: Mesh, before: Array, after: Array, rho: Array) -> float:
+    """Mass of a body over that of its cells once ties and bonds have moved nodes onto faces [-].
+
+    Args:
+        body, mesh: of it.
+        before, after: places of the nodes [m], shape (node_count, 3), float64.
+        rho: density of each cell [kg/m^3], shape (cell_count,), float64.
+    """
+    if np.array_equal(before, after):
+        return 1.0
+    parts = body_cells(body, mesh)
+    old, new = (sum(element_masses(part, points, rho).sum() for part in parts) for points in (before, after))
+    return float(old / new)
+
+
 def nodal_masses(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, Array]:
     """Lumped nodal masses [kg] of each body, shape (node_count,), float64: what carries the momentum.
 
@@ -132,6 +147,7 @@ def nodal_masses(scene: Scene, meshes: Mapping[str, Mesh]) -> dict[str, Array]:
         mesh = meshes[body.name]
         rho = densities(body, mesh)
         points, ties = within_body(scene, meshes, body.name)
+        rho *= kept_mass(body, mesh, mesh.points, points, rho)
         total = np.zeros(len(points))
         for part in body_cells(body, mesh):
             total += sum_to_nodes(part.conn, element_masses(part, points, rho), len(total))
