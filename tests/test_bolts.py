@@ -180,6 +180,7 @@ def test_its_preload_is_back_after_an_impact():
         loads=(SCREW, *(mca.Damping(body=name, mass=5e4) for name in ("base", "lid"))),
         impact=mca.ImpactPhase(duration=3e-4, output_interval=1e-6),
         criteria=("max_force(screw) < 2100", "max_shear(screw) < 1e6", "min_force(screw) > 1000"),
+        probes=(mca.Probe(name="lid", body="lid", nodes="zmax", cfc=1000.0),),
     )
     result = mca.run(made, device="cpu")
     force = result["bolt_screw_N"]
@@ -191,6 +192,9 @@ def test_its_preload_is_back_after_an_impact():
     assert result.summary["energy_error"] < 1e-2
     told = {item["criterion"]: item["value"] for item in result.summary["criteria"]}
     assert told["max_force(screw) < 2100"] == pytest.approx(force.max())
+    (probe,), (alone,) = result.probes, result.impact().probes  # its 2 m/s of the fall begin with the impact
+    assert probe.velocity[start, 2] == pytest.approx(-2.0, rel=1e-3) and not probe.acceleration[start].any()
+    np.testing.assert_array_equal(probe.filtered()[start:], alone.filtered())
 
 
 def test_a_tightened_bolt_goes_on_from_a_saved_state(tmp_path: Path):

@@ -66,7 +66,8 @@ def joined(scene: Scene, probes: Probes | None, parts: Sequence[Rows]) -> dict[s
     for part, count in zip(parts, counts, strict=True) if probes else ():
         shape = count, len(probes.corner) if probes else 0, 6
         stress += part.path_stress or [np.full(shape, np.nan, dtype=np.float32)]
-    seen, cut = sensor_histories(scene, history["time_s"], [row for part in parts for row in part.sensors])
+    records = [row for part in parts for row in part.sensors]
+    seen, cut = sensor_histories(scene, history["time_s"], records, counts)
     contacts = tuple(_one_contact(own) for own in zip(*known, strict=True))
     paths = path_histories(probes, stress) if probes else ()
     return {"history": history, "contacts": contacts, "paths": paths, "probes": seen, "sections": cut}

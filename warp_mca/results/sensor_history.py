@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warp_mca.base.errors import bad_value
+from warp_mca.base.errors import RequestError, bad_value
 from warp_mca.results.cfc import cfc_filter, is_even
 from warp_mca.results.csv_table import write_table
 from warp_mca.results.npz import load_histories, save_histories
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.integer] | NDArray[np.bool_] | slice
 
 NPZ, CSV = "probes.npz", "probes.csv"
-UNEVEN = "filter the rows of one impact by themselves, as result.impact(0).probes[0].filtered(180)"
+UNEVEN = "give rows of one spacing, as those of an impact"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,6 +35,7 @@ class ProbeHistory:
         position: [m], shape (row_count, 3), float64.
         velocity: [m/s], shape (row_count, 3), float64.
         cfc: channel frequency class that the scene asks for [Hz], or None.
+        begins: whether a phase begins with each row, bool, shape (row_count,).
     """
 
     name: str
@@ -42,45 +43,71 @@ class ProbeHistory:
     position: Array
     velocity: Array
     cfc: float | None = None
+    begins: NDArray[np.bool_]
 
     @property
     def acceleration(self) -> Array:
         """Change of the velocity over each output interval [m/s^2], shape (row_count, 3): its mean there, raw.
 
-        Its sum times the interval is exactly the change of the velocity. The first row ends no interval and is 0.
+        Its sum times the interval is exactly the change of the velocity in a phase. The first row of a phase ends no
+        interval and is 0: parts that were bolted at rest may fall from then on.
         """
         found = np.zeros_like(self.velocity)
         np.divide(np.diff(self.velocity, axis=0), np.diff(self.time)[:, None], out=found[1:])
+        found[self.begins] = 0.0
         return found
 
     def filtered(self, cfc: float | None = None) -> Array:
         """Acceleration by the filter of SAE J211 [m/s^2], shape (row_count, 3), see `cfc_filter`.
 
+        Each phase is filtered by itself; one with rows too far apart for the class, or uneven, has no numbers.
+
         Args:
             cfc: channel frequency class [Hz]; that of the scene if None.
 
         Raises:
-            RequestError: no class is given, rows are too far apart for it, or not even.
+            RequestError: no class is given, or it can be had of no phase.
         """
-        if not is_even(self.time):
-            raise bad_value(f"probe {self.name}: time between rows", "uneven", UNEVEN)
         chosen = self.cfc if cfc is None else cfc
         if chosen is None:
             raise bad_value("cfc", None, "give the channel frequency class, as 60, 180, 600 or 1000 Hz")
-        if len(self.time) < 2:  # a guard stopped the run at once
-            return self.acceleration
-        return cfc_filter(self.acceleration, float(self.time[-1] - self.time[0]) / (len(self.time) - 1), chosen)
+        found, refused = np.full_like(self.velocity, np.nan), None
+        phases = np.split(np.arange(len(self.time)), np.flatnonzero(self.begins[1:]) + 1)
+        for rows in phases:
+            try:
+                found[rows] = self._filtered(rows, chosen)
+            except RequestError as error:
+                refused = error
+        if refused and np.isnan(found).all():
+            raise refused
+        return found
+
+    def _filtered(self, rows: Rows, cfc: float) -> Array:
+        """Acceleration in the rows of a phase by the filter.
+
+        Raises:
+            RequestError: rows are too far apart for it, or not even.
+        """
+        raw, time = self.acceleration[rows], self.time[rows]
+        if len(time) < 2:  # a guard stopped the run at once
+            return raw
+        if not is_even(time):
+            raise bad_value(f"probe {self.name}: time between rows", "uneven", UNEVEN)
+        return cfc_filter(raw, float(time[-1] - time[0]) / (len(time) - 1), cfc)
 
     @property
     def own_filtered(self) -> Array | None:
-        """Acceleration filtered as the scene asks [m/s^2], or None: it does not, or rows are not even."""
-        if self.cfc is None or not is_even(self.time):
+        """Acceleration filtered as the scene asks [m/s^2], or None: it does not, or it can be had of no phase."""
+        try:
+            return None if self.cfc is None else self.filtered()
+        except RequestError:
             return None
-        return self.filtered()
 
     def at(self, rows: Rows) -> ProbeHistory:
         """The same in some output intervals: a slice, numbers (count,), or whether each is one of them (row_count,)."""
-        return replace(self, time=self.time[rows], position=self.position[rows], velocity=self.velocity[rows])
+        time, begins = self.time[rows], self.begins[rows].copy()
+        begins[:1] = True
+        return replace(self, time=time, position=self.position[rows], velocity=self.velocity[rows], begins=begins)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,20 +132,29 @@ class SectionHistory:
 Sensors = tuple[tuple[ProbeHistory, ...], tuple[SectionHistory, ...]]
 
 
-def sensor_histories(scene: Scene, time: Array, records: Sequence[Array]) -> Sensors:
+def sensor_histories(scene: Scene, time: Array, records: Sequence[Array], counts: Sequence[int]) -> Sensors:
     """What the probes and the sections of a scene recorded.
 
     Args:
         scene: whose they are.
         time: of each row [s], shape (row_count,).
         records: of each row, as `SceneRecords.sensors` has them.
+        counts: of the rows of each phase.
     """
     count = len(scene.probes) + len(scene.sections)
     if not count:
         return (), ()
     parts = np.array(records).reshape(len(time), count, 2, 3)
+    begins = np.isin(np.arange(len(time)), np.cumsum([0, *counts]))
     probes = (
-        ProbeHistory(name=probe.name, time=time, position=parts[:, k, 0], velocity=parts[:, k, 1], cfc=probe.cfc)
+        ProbeHistory(
+            name=probe.name,
+            time=time,
+            position=parts[:, k, 0],
+            velocity=parts[:, k, 1],
+            cfc=probe.cfc,
+            begins=begins,
+        )
         for k, probe in enumerate(scene.probes)
     )
     sections = (
@@ -192,8 +228,9 @@ def _greatest(key: str, vectors: Array, time: Array) -> dict[str, Any]:
 def save_sensors(folder: Path, time: Array, probes: Sequence[ProbeHistory], sections: Sequence[SectionHistory]) -> None:
     """Write probes.npz and probes.csv.
 
-    The archive has time_s; of each probe NAME/position_m, NAME/velocity, NAME/acceleration (raw) and NAME/cfc, nan for
-    none; of each section NAME/force_N and NAME/moment_Nm. The table has the columns of `sensor_columns`.
+    The archive has time_s; of each probe NAME/position_m, NAME/velocity, NAME/acceleration (raw), NAME/cfc, nan for
+    none, and NAME/begins, true where a phase begins; of each section NAME/force_N and NAME/moment_Nm. The table has the
+    columns of `sensor_columns`.
     """
     histories: dict[str, Mapping[str, NDArray]] = {
         probe.name: {
@@ -201,6 +238,7 @@ def save_sensors(folder: Path, time: Array, probes: Sequence[ProbeHistory], sect
             "velocity": probe.velocity,
             "acceleration": probe.acceleration,
             "cfc": np.array(np.nan if probe.cfc is None else probe.cfc),
+            "begins": probe.begins,
         }
         for probe in probes
     }
@@ -215,9 +253,16 @@ def load_sensors(file: str | os.PathLike[str]) -> Sensors:
         time = arrays["time_s"]
     probes = (
         ProbeHistory(
-            name=name, time=time, position=position, velocity=velocity, cfc=None if np.isnan(cfc) else float(cfc)
+            name=name,
+            time=time,
+            position=position,
+            velocity=velocity,
+            cfc=None if np.isnan(cfc) else float(cfc),
+            begins=begins,
         )
-        for name, (position, velocity, cfc) in load_histories(file, "position_m", "velocity", "cfc").items()
+        for name, (position, velocity, cfc, begins) in load_histories(
+            file, "position_m", "velocity", "cfc", "begins"
+        ).items()
     )
     sections = (
         SectionHistory(name=name, force=force, moment=moment)
