@@ -62,8 +62,10 @@ def soft_springs(c: Finished, most: float) -> Iterator[Values]:
     for k, ((name, springs), contact) in enumerate(zip(c.shares.items(), c.scene.contacts, strict=True)):
         if springs is not None and springs.loss > most and not springs.rest and not _given(contact):
             remedy = "raise the contact's penalty, or refine the mesh there"
-            if springs.edges:
+            if springs.where == "edges":
                 remedy = "give the contact penalty=10 and refine the mesh there until its peak no longer changes"
+            elif contact.penalty is None and springs.where == "flat":  # stiffer ones ring there: 2 rho c A v with 10
+                remedy = "give the contact penalty=2, or refine the mesh there"
             elif contact.penalty is None and k not in curved:
                 remedy = "give the contact penalty=10, or refine the mesh there"
             elif contact.penalty is not None and k in curved:
@@ -150,8 +152,8 @@ def spring_shares(
             time=ledger.steps.interval * greatest,
             pressed=ledger.steps.interval * (greatest - int(np.argmax(force > 0.0)) + 1),
         )
-        loss, edges = loss_of_peak(c, k, depths, peak, ledger.time())
-        found[name] = SpringShare(share=peak.share, loss=loss, edges=edges)
+        loss, where = loss_of_peak(c, k, depths, peak, ledger.time())
+        found[name] = SpringShare(share=peak.share, loss=loss, where=where)
     return found
 
 

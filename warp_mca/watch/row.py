@@ -118,13 +118,13 @@ class SpringShare:
         share: of the energy; where an interference loads the contact at rest, of that which it stores.
         loss: of the force.
         rest: whether an interference loads the contact at rest, as a press fit or heat does.
-        edges: whether edges or corners bear it.
+        where: what bears it, "edges" and corners, or "flat" faces that strike; empty for anything else.
     """
 
     share: float
     loss: float
     rest: bool = False
-    edges: bool = False
+    where: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)

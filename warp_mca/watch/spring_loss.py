@@ -66,8 +66,8 @@ def curved_contacts(model: Model) -> set[int]:
     return {item.contact for item in model.passes if item.curved}
 
 
-def loss_of_peak(c: Context, k: int, depths: Sequence[Array], peak: Peak, end: float) -> tuple[float, bool]:
-    """Relative loss of the force peak of contact k [-], and whether edges or corners bear it.
+def loss_of_peak(c: Context, k: int, depths: Sequence[Array], peak: Peak, end: float) -> tuple[float, str]:
+    """Relative loss of the force peak of contact k [-], and what bears it, as `SpringShare.where`.
 
     - Curved contacts and edges lose `PEAK_LOSS` s, flat ones what `_loss_of_flat` says.
     - What lands flat on a plane loses what its force lacks of that of a wave, `_loss_of_landing`.
@@ -83,17 +83,19 @@ def loss_of_peak(c: Context, k: int, depths: Sequence[Array], peak: Peak, end: f
     curved = k in curved_contacts(c.model)
     lands = _lands_flat(c, k, depths)  # as a round bar does with its end, though its skin is curved
     pair = _flat_pair(c, k, depths) if lands or not curved else None
-    edges = pair is not None and on_edges(c, k, depths)
+    where = "edges" if pair is not None and on_edges(c, k, depths) else ""
+    if pair is not None and not where and math.isfinite(_wave_forces(c, pair, end)[0]):
+        where = "flat"
     if pair is not None and lands and peak.plastic <= _PLASTIC:
         loss = _loss_of_landing(c, pair, peak.force)
         if loss is not None:
-            return loss, edges
-    if pair is not None and not edges:
+            return loss, where
+    if pair is not None and where != "edges":
         given = curved or c.scene.contacts[k].penalty is not None
-        return _loss_of_flat(c, pair, peak, end, given), edges
+        return _loss_of_flat(c, pair, peak, end, given), where
     if isinstance(c.scene.contacts[k], ContactAll) and not curved and _is_pressed_slowly(c, peak.time):
-        return peak.series, edges
-    return PEAK_LOSS * peak.share, edges
+        return peak.series, where
+    return PEAK_LOSS * peak.share, where
 
 
 def _flat_pair(c: Context, k: int, depths: Sequence[Array]) -> Pair | None:
