@@ -17,6 +17,7 @@ from test_run import bar
 
 import warp_mca as mca
 from warp_mca.phases.impact import Impact
+from warp_mca.results.sensor_history import load_sensors
 from warp_mca.scene import model_file
 
 STEEL = mca.Elastic(E=210e9, nu=0.3, rho=7850.0)
@@ -279,6 +280,10 @@ def test_results_are_written_and_read_back(tmp_path: Path):
     assert len(rows) == len(result.time) and {"time_s", "inside.ax", "inside.ax_cfc1000", "large cut.Fy"} <= set(names)
     column = np.array([float(row.split(",")[names.index("inside.ay")]) for row in rows])
     assert np.array_equal(column, loaded.probes[1].acceleration[:, 1])
+    with np.load(tmp_path / "out" / "probes.npz") as arrays:
+        np.savez(tmp_path / "old.npz", **{key: arrays[key] for key in arrays if not key.endswith("/begins")})
+    old, _ = load_sensors(tmp_path / "old.npz")
+    np.testing.assert_array_equal([probe.begins for probe in old], [probe.begins for probe in loaded.probes])
     units = result.summary["units"]
     assert set(units) == {*result.history, *names}
     assert [units[name] for name in ("F_n_N", "inside.ay", "large cut.Fy", "large cut.Mx")] == "N,m/s^2,N,N m".split(

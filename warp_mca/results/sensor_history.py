@@ -251,6 +251,7 @@ def load_sensors(file: str | os.PathLike[str]) -> Sensors:
     """The probes and sections of a probes.npz."""
     with np.load(file) as arrays:
         time = arrays["time_s"]
+    begins = {name: rows for name, (rows,) in load_histories(file, "begins").items()}  # not of earlier versions
     probes = (
         ProbeHistory(
             name=name,
@@ -258,11 +259,9 @@ def load_sensors(file: str | os.PathLike[str]) -> Sensors:
             position=position,
             velocity=velocity,
             cfc=None if np.isnan(cfc) else float(cfc),
-            begins=begins,
+            begins=begins[name] if name in begins else np.arange(len(time)) == 0,
         )
-        for name, (position, velocity, cfc, begins) in load_histories(
-            file, "position_m", "velocity", "cfc", "begins"
-        ).items()
+        for name, (position, velocity, cfc) in load_histories(file, "position_m", "velocity", "cfc").items()
     )
     sections = (
         SectionHistory(name=name, force=force, moment=moment)
