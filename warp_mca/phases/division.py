@@ -63,16 +63,23 @@ def divide_alike(parts: Sequence[tuple[Scene, Model]], duration: float, substeps
 
 def coarser(steps: Steps, model: Model, rows: int, intervals: int, speed: float) -> Steps:
     """The same time step in intervals of so many `rows`, with searches for contact that a `speed` [m/s] needs."""
-    margins = [item.margin for item in model.passes if item.plane is None]
-    needed = _reserve(model) * speed * rows * steps.interval / (0.5 * min(margins)) if margins else 1.0
+    needed = _searches(model, speed * rows * steps.interval, rows * steps.per_interval)
     most = rows * steps.searches
     joined = max(k for k in range(1, most + 1) if most % k == 0 and (k == 1 or most // k >= needed))
     return Steps(steps.dt, per_search=steps.per_search * joined, searches=most // joined, intervals=intervals)
 
 
-def _reserve(model: Model) -> float:
-    """Times the greatest speed that searches for contact allow for [-]."""
-    return EDGE_RESERVE if any(item.sides > 1 for item in model.passes) else SPEED_RESERVE
+def _searches(model: Model, way: float, steps: float) -> float:
+    """Searches for contact in a time in which the fastest node moves this way [m], and in so many stable steps.
+
+    At sharp edges there is one a step at most for the sake of nodes that these throw.
+    """
+    margins = [item.margin for item in model.passes if item.plane is None]
+    if not margins:
+        return 1.0
+    wanted = way / (0.5 * min(margins))
+    sharp = any(item.sides > 1 for item in model.passes)
+    return max(SPEED_RESERVE * wanted, min(EDGE_RESERVE * wanted, steps) if sharp else 0.0)
 
 
 def _limits(scene: Scene, model: Model, interval: float, intervals: int) -> tuple[float, float]:
@@ -109,11 +116,10 @@ def _limits(scene: Scene, model: Model, interval: float, intervals: int) -> tupl
     if apart > float(np.ptp(model.X, axis=0).max()):
         remedy = f"in a step some nodes would move {apart:.3g} m more than others; check the unit [m/s or rad/s]"
         raise bad_value("speed of the bodies", speed, remedy)
-    margins = [item.margin for item in model.passes if item.plane is None]
-    reserve = _reserve(model)
-    searches = reserve * fastest * interval / (0.5 * min(margins)) if margins else 1.0
-    if margins and (pushed := load_speed(model, interval * intervals)):
-        searches += min(reserve * pushed * interval / (0.5 * min(margins)), interval / stable)
+    most = interval / stable
+    searches = _searches(model, fastest * interval, most)
+    if any(item.plane is None for item in model.passes) and (pushed := load_speed(model, interval * intervals)):
+        searches += min(_searches(model, pushed * interval, most), most)
     if not searches * intervals <= MAX_STEPS:
         remedy = f"so fast, a run would search for contact more than {MAX_STEPS:.0e} times; check the unit [m/s]"
         raise bad_value("speed of the bodies", max(float(np.abs(model.V).max()), driven), remedy)
