@@ -71,24 +71,23 @@ class ProbeHistory:
         chosen = self.cfc if cfc is None else cfc
         if chosen is None:
             raise bad_value("cfc", None, "give the channel frequency class, as 60, 180, 600 or 1000 Hz")
-        found, refused = np.full_like(self.velocity, np.nan), None
+        raw, found, refused = self.acceleration, np.full_like(self.velocity, np.nan), None
         phases = np.split(np.arange(len(self.time)), np.flatnonzero(self.begins[1:]) + 1)
         for rows in phases:
             try:
-                found[rows] = self._filtered(rows, chosen)
+                found[rows] = self._filtered(raw[rows], self.time[rows], chosen)
             except RequestError as error:
                 refused = error
         if refused and np.isnan(found).all():
             raise refused
         return found
 
-    def _filtered(self, rows: Rows, cfc: float) -> Array:
-        """Acceleration in the rows of a phase by the filter.
+    def _filtered(self, raw: Array, time: Array, cfc: float) -> Array:
+        """Acceleration of one phase by the filter.
 
         Raises:
             RequestError: rows are too far apart for it, or not even.
         """
-        raw, time = self.acceleration[rows], self.time[rows]
         if len(time) < 2:  # a guard stopped the run at once
             return raw
         if not is_even(time):

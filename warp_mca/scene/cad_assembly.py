@@ -148,15 +148,13 @@ class Assembly:
         for touch in self.touching:
             fitting = [key for key in self.join if _fits(key, touch)]
             found[touch] = self.join[min(fitting, key=_is_rest)] if fitting else "contact"
-        from warp_mca.geometry.cad_solids import NEAR  # which imports gmsh's readers
-
         for key in self.join:
             if not any(_fits(key, touch) for touch in self.touching):
+                from warp_mca.geometry.cad_solids import NEAR  # which imports gmsh's readers
+
                 pairs = "; ".join(touch.text for touch in self.touching) or "none do"
-                remedy = (
-                    f"no such solids touch ({pairs}); correct the names, or close gaps above {NEAR:.1%} of the smaller"
-                )
-                raise bad_value("Assembly.join", key, f"{remedy} solid")
+                near = f"solids with gaps up to {NEAR:.1%} of the smaller one do"
+                raise bad_value("Assembly.join", key, f"no such solids touch ({pairs}; {near}); correct the names")
         return found
 
     @cached_property
