@@ -197,6 +197,18 @@ def test_its_preload_is_back_after_an_impact():
     np.testing.assert_array_equal(probe.filtered()[start:], alone.filtered())
 
 
+@pytest.mark.parametrize("device", ["cpu", pytest.param("cuda:0", marks=pytest.mark.gpu)])
+def test_ends_of_many_nodes_are_added_up_in_parts(device: str, monkeypatch: pytest.MonkeyPatch):
+    """The sums of parts, of which the last are shorter, give the same bolt."""
+    scene = clamped()
+    whole = mca.run(scene, device=device)
+    monkeypatch.setattr("warp_mca.physics.loads.springs_stage.PART", 4)
+    parts = mca.run(scene, device=device)
+    assert begun(scene, device=device).solver.Bolt.parts
+    for column in ("bolt_screw_N", "bolt_screw_shear_N"):
+        assert parts[column] == pytest.approx(whole[column], rel=1e-6, abs=1e-6 * SCREW.preload)
+
+
 def test_a_tightened_bolt_goes_on_from_a_saved_state(tmp_path: Path):
     """The lengths of its springs, which tightening sets, are part of the State."""
     impact = begun(clamped())

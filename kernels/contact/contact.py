@@ -24,8 +24,14 @@ LANES = 4  # GPU threads of a slave node, which share its candidate faces, and o
 MOST_THREADS = 1 << 15  # of all slaves, beyond which they fill a GPU with one thread each
 
 
-def slave_lanes(lanes: int, count: int) -> int:
-    """How many of `lanes` threads share the candidate faces of each of `count` slaves."""
+def slave_lanes(lanes: int, count: int, sides: int, bonded: bool) -> int:
+    """How many of `lanes` threads share the candidate faces of each of `count` slaves of a master with these `sides`.
+
+    Where sides meet, few nodes have faces near them, and all wait for those that have most. A bond takes one thread:
+    others might miss that it broke.
+    """
+    if sides > 1:
+        return 1 if bonded else lanes
     return lanes if lanes * count <= MOST_THREADS else 1
 
 

@@ -18,6 +18,7 @@ from warp_mca.kernels.contact.pairs import neighbours_spring, same_solid
 from warp_mca.kernels.contact.projection import area_vector, lies_below, middle
 from warp_mca.kernels.contact.settle import Touch, meet, settle_functions
 from warp_mca.kernels.contact.side_choice import NodeSprings
+from warp_mca.kernels.contact.side_reach import fronts_type
 from warp_mca.kernels.contact.spring import FAR, Spring, pressure_function
 from warp_mca.kernels.contact.way_back import note_way, slides_at, usual_depth
 
@@ -120,18 +121,18 @@ def meet_edge(
 @cache
 def support_function(sides: int) -> Any:
     """The function that finds the edge of the slave which rests on the side of spring e."""
-    Gaps, Faces = wp.types.vector(sides, wp.float64), wp.types.vector(sides, wp.int32)
+    Fronts = fronts_type(sides)
 
     @wp.func
-    def face_across(e: int, begin: int, front_gap: Gaps, front_face: Faces, spring: Spring) -> int:
+    def face_across(e: int, begin: int, fronts: Fronts, spring: Spring) -> int:
         """The nearest face of another side that has the node in front of it, or -1; no other side presses the node."""
         found = int(-1)
         least = wp.float64(FAR)
         for p in range(wp.static(sides)):
             if begin + p != e:
-                if front_gap[p] < least:
-                    least = front_gap[p]
-                    found = front_face[p]
+                if fronts.gap[p] < least:
+                    least = fronts.gap[p]
+                    found = fronts.face[p]
         for p in range(wp.static(sides)):
             if begin + p != e and spring.face[begin + p] >= 0:
                 found = int(-1)
@@ -143,8 +144,7 @@ def support_function(sides: int) -> Any:
         s: int,
         e: int,
         node: NodeSprings,
-        front_gap: Gaps,
-        front_face: Faces,
+        fronts: Fronts,
         along: wp.vec3f,
         spring: Spring,
     ) -> Support:
@@ -155,7 +155,7 @@ def support_function(sides: int) -> Any:
         support = no_support()
         f = int(-1)
         if slid_off(e, spring):
-            f = face_across(e, node.begin, front_gap, front_face, spring)
+            f = face_across(e, node.begin, fronts, spring)
         if f >= 0:
             i = at.slaves.node[s]
             x = at.X[i] + at.u[i]
@@ -205,7 +205,7 @@ def release_function(friction: bool, sides: int, laws: Laws) -> Any:
     """
     settle, let_go, leave = settle_functions(friction, laws)
     pressure, find_support = pressure_function(friction), support_function(sides)
-    Gaps, Faces = wp.types.vector(sides, wp.float64), wp.types.vector(sides, wp.int32)
+    Fronts = fronts_type(sides)
 
     @wp.func
     def release(
@@ -218,8 +218,7 @@ def release_function(friction: bool, sides: int, laws: Laws) -> Any:
         node: NodeSprings,
         newcomer: int,
         ends: bool,
-        front_gap: Gaps,
-        front_face: Faces,
+        fronts: Fronts,
         along: wp.vec3f,
         mu: wp.float64,
         per_newton: wp.float64,
@@ -231,7 +230,7 @@ def release_function(friction: bool, sides: int, laws: Laws) -> Any:
     ) -> wp.vec3d:
         support, i = no_support(), at.slaves.node[s]
         if node.listed > 1 and (newcomer < 0 or newcomer == e) and not hovers(at, near):
-            support = find_support(at, s, e, node, front_gap, front_face, along, spring)
+            support = find_support(at, s, e, node, fronts, along, spring)
         if support.edge < 0:
             force = let_go(e, i, at.X, at.u, v, at.master, dt, near.front, spring.held[e], spring)
             note_way(e, bool(False), ends, spring)

@@ -215,13 +215,69 @@ def nearest_of(
     return best
 
 
+@wp.func
+def nearest_again(
+    X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), face: wp.array2d(dtype=wp.int32), f: int, x: wp.vec3d
+) -> Nearest:
+    """What `nearest_face` found, for the face that it chose, or none if f is -1; without the faces in front."""
+    near = Nearest()
+    near.face = f
+    near.front = wp.float64(FAR)
+    near.front_face = -1
+    near.front_rank = wp.float64(FAR)
+    if f >= 0:
+        _, at, away, area_normal, triangle = project_on_face(X, u, face, f, x)
+        near.area = wp.length(area_normal)
+        near.normal = (wp.float64(1.0) / near.area) * area_normal
+        near.gap = wp.dot(away, near.normal)
+        near.at = at
+        near.beside = is_beside(at, triangle, wp.float64(_RIM))
+    return near
+
+
+@cache
+def shared_function(lanes: int, exchange: Any) -> Any:
+    """The function that gives what `lanes` threads of a GPU found together of what `nearest_face` gives.
+
+    That is front, front_rank, front_face and face of all their candidates; `exchange` gives values of other lanes.
+    """
+
+    @wp.func
+    def shared(X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), master: Master, near: Nearest):
+        front = near.front
+        rank = near.front_rank
+        front_face = near.front_face
+        gap = near.gap
+        beside = near.beside
+        face = near.face
+        if wp.static(lanes > 1):
+            for k in range(wp.static(lanes.bit_length() - 1)):
+                other_gap = exchange(gap, 1 << k)
+                other_beside = exchange(wp.where(beside, wp.float64(1.0), wp.float64(0.0)), 1 << k) > wp.float64(0.0)
+                other = int(exchange(wp.float64(face), 1 << k))
+                front = wp.min(front, exchange(front, 1 << k))
+                other_rank = exchange(rank, 1 << k)
+                other_front = int(exchange(wp.float64(front_face), 1 << k))
+                if other_rank < rank or (other_rank == rank and other_front < front_face):
+                    rank = other_rank
+                    front_face = other_front
+                first = comes_first(X, u, master.face, other, other_gap, other_beside, face, gap, beside)
+                if other >= 0 and (face < 0 or first):
+                    gap = other_gap
+                    beside = other_beside
+                    face = other
+        return front, rank, front_face, face
+
+    return shared
+
+
 @cache
 def nearest_function(lanes: int) -> Any:
     """The function that gives `nearest_face` by `lanes` threads of a GPU, which share the candidates of a spring.
 
     It returns what thread q found, and whether that, or that there is none, holds for the node.
     """
-    _, exchange = shared_functions("float64")
+    shared = shared_function(lanes, shared_functions("float64")[1])
 
     @wp.func
     def nearest_of_lanes(
@@ -236,24 +292,10 @@ def nearest_function(lanes: int) -> Any:
         near = nearest_of(X, u, master, s, x, along, q, wp.static(lanes))
         holds = bool(True)
         if wp.static(lanes > 1):
-            gap = near.gap
-            beside = near.beside
-            face = near.face
-            for k in range(wp.static(lanes.bit_length() - 1)):
-                other_gap = exchange(gap, 1 << k)
-                other_beside = exchange(wp.where(beside, wp.float64(1.0), wp.float64(0.0)), 1 << k) > wp.float64(0.0)
-                other = int(exchange(wp.float64(face), 1 << k))
-                near.front = wp.min(near.front, exchange(near.front, 1 << k))
-                rank = exchange(near.front_rank, 1 << k)
-                front_face = int(exchange(wp.float64(near.front_face), 1 << k))
-                if rank < near.front_rank or (rank == near.front_rank and front_face < near.front_face):
-                    near.front_rank = rank
-                    near.front_face = front_face
-                first = comes_first(X, u, master.face, other, other_gap, other_beside, face, gap, beside)
-                if other >= 0 and (face < 0 or first):
-                    gap = other_gap
-                    beside = other_beside
-                    face = other
+            front, rank, front_face, face = shared(X, u, master, near)
+            near.front = front
+            near.front_rank = rank
+            near.front_face = front_face
             holds = near.face >= 0 and near.face == face
             if face < 0:
                 holds = q == 0

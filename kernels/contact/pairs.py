@@ -16,7 +16,8 @@ class Pairs:
         body: of each face, shape (face_count,), int32.
         factor: of the stiffness of springs between two bodies, 0 where they do not meet [-], those of the first body of
             the first scene with all others first, float64.
-        barred_offset, barred: faces of its own body that a slave node never meets, compressed rows, int32.
+        barred_offset, barred: faces of its own body that a slave node never meets, compressed rows in
+            ascending order, int32.
         slot: body that each row of springs of a slave node belongs to, or -1; shape (slave_count, slot_count), int32.
             Empty where a node has springs for one body alone.
     """
@@ -54,9 +55,15 @@ def may_meet(pairs: Pairs, s: int, f: int) -> bool:
     if pair_factor(pairs, s, f) == wp.float64(0.0):
         return False
     if pairs.own[s] == pairs.body[f]:
-        for j in range(pairs.barred_offset[s], pairs.barred_offset[s + 1]):
-            if pairs.barred[j] == f:
-                return False
+        low, end = int(pairs.barred_offset[s]), pairs.barred_offset[s + 1]
+        high = int(end)
+        while low < high:
+            middle = (low + high) // 2
+            if pairs.barred[middle] < f:
+                low = middle + 1
+            else:
+                high = middle
+        return low == end or pairs.barred[wp.min(low, end - 1)] != f
     return True
 
 

@@ -108,7 +108,7 @@ def springs_function(friction: bool, sides: int) -> Any:
 @cache
 def choice_functions(friction: bool, sides: int) -> tuple[Any, Any]:
     """The functions (choose: the choice after one more side; confirm: how a side meets the node, given it)."""
-    way_back, pressure = way_back_function(sides), pressure_function(friction)
+    way_back, pressure, Faces = way_back_function(sides), pressure_function(friction), wp.types.vector(sides, wp.int32)
 
     @wp.func
     def keeper(at: Surfaces, f: int, begin: int, spring: Spring):
@@ -145,7 +145,7 @@ def choice_functions(friction: bool, sides: int) -> tuple[Any, Any]:
         near: Nearest,
         touch: Touch,
         touches: bool,
-        along: wp.vec3f,
+        below: Faces,
         node: NodeSprings,
         choice: Choice,
         spring: Spring,
@@ -153,7 +153,7 @@ def choice_functions(friction: bool, sides: int) -> tuple[Any, Any]:
     ) -> Choice:
         """A free node goes to the side behind which it was least deep before; ties go to the fastest approach.
 
-        A node that comes over an edge goes to the side on which it slides.
+        A node that comes over an edge goes to the side on which it slides. `below` are the faces that may press it.
         """
         chosen = choice
         other = int(-1)
@@ -163,7 +163,7 @@ def choice_functions(friction: bool, sides: int) -> tuple[Any, Any]:
             if node.holding:
                 other = keeper(at, near.face, node.begin, spring)
             if touches and other < 0:
-                way = way_back(at, s, node.begin, e, near, touch.du, along, spring, recent_force)
+                way = way_back(at, s, node.begin, e, near, touch.du, below, spring, recent_force)
         edge = edge_of(near)
         approach = -wp.dot(touch.du, near.normal)
         before = wp.max(-near.gap - approach - wp.float64(_ROUNDING) * edge, wp.float64(0.0))

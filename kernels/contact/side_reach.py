@@ -6,12 +6,22 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.edges import Surfaces, opposition
-from warp_mca.kernels.contact.nearest import Nearest, edge_of, is_outside, nearest_face, passes_by, reachable
+from warp_mca.kernels.contact.nearest import (
+    Nearest,
+    edge_of,
+    is_outside,
+    nearest_again,
+    nearest_of,
+    passes_by,
+    reachable,
+    shared_function,
+)
 from warp_mca.kernels.contact.pairs import same_solid
 from warp_mca.kernels.contact.projection import area_vector, lies_below
 from warp_mca.kernels.contact.side_choice import NodeSprings
 from warp_mca.kernels.contact.spring import FAR
 from warp_mca.kernels.contact.way_back import OPPOSES, slides_at, usual_depth
+from warp_mca.kernels.hardware.shared_memory import group_exchange
 
 
 @wp.func
@@ -53,34 +63,69 @@ def in_reach(near: Nearest, node: NodeSprings, held: wp.float64, fold: wp.float6
 
 
 @cache
-def front_functions(sides: int) -> tuple[Any, Any]:
-    """The functions of the faces that have a node in front of them.
-
-    `front_faces` gives the nearest such face of each side: distances [m], numbers, and the least distance; FAR if only
-    one side has candidates. `may_press` says whether the nearest face can press the node, given the faces of the other
-    sides and whether its own side `pressed` the node before.
-    """
+def fronts_type(sides: int) -> Any:
+    """The struct of the faces near a slave node, of each of its sides."""
     Gaps, Faces = wp.types.vector(sides, wp.float64), wp.types.vector(sides, wp.int32)
 
+    @wp.struct
+    class Fronts:
+        """What `nearest_face` finds for each side, if one has candidates.
+
+        Attributes:
+            gap: `Nearest.front` [m].
+            rank: `Nearest.front_rank` [m].
+            face: `Nearest.front_face`.
+            below: `Nearest.face`.
+        """
+
+        gap: Gaps
+        rank: Gaps
+        face: Faces
+        below: Faces
+
+    return Fronts
+
+
+@cache
+def front_functions(sides: int, lanes: int) -> tuple[Any, Any, Any]:
+    """The functions that find and use the faces near a node.
+
+    `near_faces` looks at the candidates of all sides, which `lanes` threads of a GPU share. `near_side` gives what
+    `nearest_face` finds for a side. `may_press` says whether the nearest face can press the node, given the faces of
+    the other sides and whether its own side `pressed` the node before.
+    """
+    Gaps, Faces = wp.types.vector(sides, wp.float64), wp.types.vector(sides, wp.int32)
+    Fronts, shared = fronts_type(sides), shared_function(lanes, group_exchange(lanes))
+
     @wp.func
-    def front_faces(
-        at: Surfaces,
-        node: NodeSprings,
-        x: wp.vec3d,
-        along: wp.vec3f,
-    ):
-        gaps = Gaps()
-        faces = Faces()
-        front = wp.float64(FAR)
-        for p in range(wp.static(sides)):
-            gaps[p] = wp.float64(FAR)
-        if node.listed > 1:
+    def near_faces(at: Surfaces, node: NodeSprings, x: wp.vec3d, along: wp.vec3f, lane: int) -> Fronts:
+        gaps = Gaps(wp.float64(FAR))
+        ranks = Gaps(wp.float64(FAR))
+        faces = Faces(-1)
+        below = Faces(-1)
+        if node.listed > 0:
             for e in range(node.begin, node.begin + wp.static(sides)):
-                near = nearest_face(at.X, at.u, at.master, e, x, along)
-                gaps[e - node.begin] = near.front
-                faces[e - node.begin] = near.front_face
-                front = wp.min(front, near.front)
-        return gaps, faces, front
+                p = e - node.begin
+                near = nearest_of(at.X, at.u, at.master, e, x, along, lane, wp.static(lanes))
+                front, rank, face, pressing = shared(at.X, at.u, at.master, near)
+                gaps[p] = front
+                ranks[p] = rank
+                faces[p] = face
+                below[p] = pressing
+        fronts = Fronts()
+        fronts.gap = gaps
+        fronts.rank = ranks
+        fronts.face = faces
+        fronts.below = below
+        return fronts
+
+    @wp.func
+    def near_side(at: Surfaces, fronts: Fronts, p: int, x: wp.vec3d) -> Nearest:
+        near = nearest_again(at.X, at.u, at.master.face, fronts.below[p], x)
+        near.front = fronts.gap[p]
+        near.front_rank = fronts.rank[p]
+        near.front_face = fronts.face[p]
+        return near
 
     @wp.func
     def may_press(
@@ -91,8 +136,7 @@ def front_functions(sides: int) -> tuple[Any, Any]:
         pressed: bool,
         du: wp.vec3d,
         node: NodeSprings,
-        front_gap: Gaps,
-        front_face: Faces,
+        fronts: Fronts,
         recent_force: wp.array(dtype=wp.vec3d),
     ) -> bool:
         edge = edge_of(near)
@@ -100,10 +144,11 @@ def front_functions(sides: int) -> tuple[Any, Any]:
         found = in_reach(near, node, held, fold, -wp.dot(du, near.normal))
         if found and is_outside(at.X, at.u, at.master.face, near):
             found = bool(False)
-        for p in range(wp.static(sides)):
-            if passes_by(bool(True), wp.max(held, node.released), front_gap[p], edge):
-                if belongs_to_other_side(at, s, near, front_face[p], front_gap[p], recent_force):
+        for e in range(node.begin, node.begin + wp.static(sides)):
+            p = e - node.begin
+            if node.listed > 1 and passes_by(bool(True), wp.max(held, node.released), fronts.gap[p], edge):
+                if belongs_to_other_side(at, s, near, fronts.face[p], fronts.gap[p], recent_force):
                     found = bool(False)
         return found
 
-    return front_faces, may_press
+    return near_faces, near_side, may_press

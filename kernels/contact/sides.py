@@ -16,7 +16,6 @@ from warp_mca.kernels.contact.edge_rest import release_function
 from warp_mca.kernels.contact.edge_shares import has_support
 from warp_mca.kernels.contact.edges import Surfaces, greatest_stiffness
 from warp_mca.kernels.contact.laws import PLAIN, Laws
-from warp_mca.kernels.contact.nearest import nearest_face
 from warp_mca.kernels.contact.search import STALE, moved_too_far
 from warp_mca.kernels.contact.settle import meet, settle_functions
 from warp_mca.kernels.contact.side_choice import (
@@ -25,7 +24,7 @@ from warp_mca.kernels.contact.side_choice import (
     springs_function,
 )
 from warp_mca.kernels.contact.side_reach import front_functions
-from warp_mca.kernels.contact.spring import Spring, pressure_function
+from warp_mca.kernels.contact.spring import FAR, Spring, pressure_function
 from warp_mca.kernels.contact.way_back import note_way, recent, way_ends
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.per_scene import kind, value_function
@@ -39,18 +38,19 @@ def add_force(i: int, force: wp.vec3d, nodal_force_out: wp.array(dtype=wp.vec3d)
 
 
 @cache
-def sided_kernel(friction: bool, each: bool, sides: int, laws: Laws = PLAIN, slots: int = 1) -> Any:
+def sided_kernel(friction: bool, each: bool, sides: int, laws: Laws = PLAIN, slots: int = 1, lanes: int = 1) -> Any:
     """Kernel: as `kernels.contact.contact.surface_kernel`, for a master with several sides.
 
     Springs and lists are ordered by slave, then by side. A node that no side presses goes to the side behind which it
     was least deep before the step; ties go to the side with the greatest approach speed. It may be as deep there as in
     the side that released it, because it may have slid over an edge. If several sides have candidates, step 0 chooses
     among them; step 1 presses the node. Each of the `slots` bodies that a node may touch at once has its own springs.
+    On a GPU, `lanes` threads share the candidates of a slave; the first one does the rest.
     """
     settle, _, leave = settle_functions(friction, laws)
     choose, confirm = choice_functions(friction, sides)
     pressure, springs_of_node = pressure_function(friction), springs_function(friction, sides)
-    front_faces, may_press = front_functions(sides)
+    near_faces, near_side, may_press = front_functions(sides, lanes)
     release = release_function(friction, sides, laws)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
 
@@ -73,7 +73,8 @@ def sided_kernel(friction: bool, each: bool, sides: int, laws: Laws = PLAIN, slo
     ):
         wait_for_previous()
         let_next_begin()
-        s = first + wp.tid()
+        lane = wp.tid() % wp.static(lanes)
+        s = first + wp.tid() // wp.static(lanes)
         i, k = at.slaves.node[s], of(scene, s)
         x, total, scale, active = at.X[i] + at.u[i], wp.vec3d(), of(per_newton, k), bool(False)
         start, end = wp.static(sides * slots) * s, wp.static(sides * slots) * (s + 1)
@@ -83,21 +84,28 @@ def sided_kernel(friction: bool, each: bool, sides: int, laws: Laws = PLAIN, slo
         for begin in range(start, end, wp.static(sides)):
             node = springs_of_node(begin, at.master.count, spring)
             along = wp.vec3f(node.pressed)
-            fronts, front_face, front = front_faces(at, node, x, along)
+            fronts = near_faces(at, node, x, along, lane)
+            front = wp.float64(FAR)
+            if node.listed > 1:
+                for p in range(wp.static(sides)):
+                    front = wp.min(front, fronts.gap[p])
             choice = first_choice(node)
             active = active or node.active
-            for step in range(wp.where(node.listed > 1, 0, wp.where(node.active, 1, 2)), 2):
+            begins = wp.where(node.listed > 1, 0, wp.where(node.active, 1, 2))
+            for step in range(wp.where(lane == 0, begins, 2), 2):
                 for e in range(node.begin, node.begin + wp.static(sides)):
-                    near = nearest_face(at.X, at.u, at.master, e, x, along)
+                    near = near_side(at, fronts, e - node.begin, x)
                     ends = way_ends(near, node.holding and spring.face[e] < 0)
                     front = wp.min(front, near.front)
                     near.front = front  # of every side so far
                     held, pressed = spring.held[e], spring.face[e] >= 0
                     if near.face >= 0:
                         touch = meet(v, at.master.face, i, near, dt, held, wp.vec3f(pressure(e, spring)))
-                        touches = may_press(at, s, near, held, pressed, touch.du, node, fronts, front_face, recent_out)
+                        touches = may_press(at, s, near, held, pressed, touch.du, node, fronts, recent_out)
                         if step == 0:
-                            choice = choose(at, s, e, near, touch, touches, along, node, choice, spring, recent_out)
+                            choice = choose(
+                                at, s, e, near, touch, touches, fronts.below, node, choice, spring, recent_out
+                            )
                         else:
                             touch = confirm(at, s, e, near, touch, touches, node, choice, spring)
                             touch.own = greatest_stiffness(at, s, near.face)
@@ -107,13 +115,13 @@ def sided_kernel(friction: bool, each: bool, sides: int, laws: Laws = PLAIN, slo
                             note_way(e, touch.touches, ends, spring)
                     elif step == 1:
                         total += release(
-                            at, v, s, e, k, near, node, choice.newcomer, ends, fronts, front_face, along,
+                            at, v, s, e, k, near, node, choice.newcomer, ends, fronts, along,
                             of(mu, k), scale, dt, spring, normal_force_out, recent_out, flag_out
                         )  # fmt: skip
-        if active:
+        if active and lane == 0:
             add_force(i, total, nodal_force_out, recent_out)
             spring.rests[s] = has_support(start, end, spring)
-        if moved_too_far(at.u[i], u_search[i], of(margin, k)):
+        if lane == 0 and moved_too_far(at.u[i], u_search[i], of(margin, k)):
             flag_out[k, STALE] = 1
 
     return begins_early(touch_sides)

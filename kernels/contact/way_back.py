@@ -6,7 +6,7 @@ from typing import Any
 import warp as wp
 
 from warp_mca.kernels.contact.edges import Surfaces, greatest_stiffness, is_on_rim, opposes_both, opposition
-from warp_mca.kernels.contact.nearest import ABOVE, SLACK, Nearest, edge_of, is_beside, nearest_face
+from warp_mca.kernels.contact.nearest import ABOVE, SLACK, Nearest, edge_of, is_beside, nearest_again
 from warp_mca.kernels.contact.pairs import same_solid
 from warp_mca.kernels.contact.projection import lies_below
 from warp_mca.kernels.contact.spring import ANY_DEPTH, FAR, Spring
@@ -117,6 +117,7 @@ def note_way(e: int, presses: bool, ends: bool, spring: Spring):
 @cache
 def way_back_function(sides: int) -> Any:
     """The function that finds the side to which a slave node comes over an edge."""
+    Faces = wp.types.vector(sides, wp.int32)
 
     @wp.func
     def way_back(
@@ -126,7 +127,7 @@ def way_back_function(sides: int) -> Any:
         e: int,
         near: Nearest,
         du: wp.vec3d,
-        along: wp.vec3f,
+        below: Faces,
         spring: Spring,
         recent_force: wp.array(dtype=wp.vec3d),
     ) -> WayBack:
@@ -147,7 +148,7 @@ def way_back_function(sides: int) -> Any:
         slides = usual_depth(at, s, near.face, near.normal, recent_force) > wp.float64(0.0)
         for q in range(begin, begin + wp.static(sides)):
             if q != e and spring.held[e] < wp.float64(ANY_DEPTH):
-                home = nearest_face(at.X, at.u, at.master, q, at.X[i] + at.u[i], along)
+                home = nearest_again(at.X, at.u, at.master.face, below[q - begin], at.X[i] + at.u[i])
                 f = wp.max(home.face, 0)
                 above = not is_beside(home.at, at.master.face[f, 2] == at.master.face[f, 3], wp.float64(_RIM))
                 if home.face >= 0 and above and same_solid(at.pairs, near.face, f):

@@ -77,6 +77,20 @@ def shared_functions(precision: str) -> tuple[Any, Any]:
     return force_pool, exchange
 
 
+@cache
+def group_exchange(lanes: int) -> Any:
+    """The function that gives the value of the lane that differs in `mask`, among `lanes` that go the same way.
+
+    Other lanes of the warp may go another one.
+    """
+    group = f"{(1 << lanes) - 1}u << (threadIdx.x & {32 - lanes}u)"
+
+    @wp.func_native(f"return __shfl_xor_sync({group}, value, mask);")
+    def exchange(value: wp.float64, mask: int) -> wp.float64: ...
+
+    return exchange
+
+
 def _begin_copy(size: int, to: str, of: str) -> str:
     target = f'"r"((unsigned)__cvta_generic_to_shared({to}))'
     return f'asm volatile("cp.async.ca.shared.global [%0], [%1], {size};" :: {target}, "l"({of}) : "memory");'

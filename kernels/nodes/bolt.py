@@ -68,7 +68,7 @@ def stretch_bolts(
     """Find the length of each spring [m] while bolts are tightened, a block of threads for each."""
     j, lane = wp.tid()
     if tightens[0] > 0:
-        L = wp.length(springs.between[j] + ends_of(j, lane, springs, u))
+        L = wp.length(springs.between[j] + ends_of(j, lane, springs.points, u))
         if lane == 0:
             L_out[j] = L
 
@@ -122,7 +122,7 @@ def read_bolts(
     force = wp.vec3d()
     axis = wp.vec3d()
     for j in range(begin[b], begin[b + 1]):
-        n = direction_of(j, springs, springs.between[j] + ends_of(j, lane, springs, u), wp.float64(0.0))
+        n = direction_of(j, springs, springs.between[j] + ends_of(j, lane, springs.points, u), wp.float64(0.0))
         force += tension[j] * n
         axis += n
     if lane == 0:

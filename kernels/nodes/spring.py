@@ -5,7 +5,8 @@ first point to the second one, and the length L between them, the tension is
 
     T = T_s(L - L_0) + T_d(dL/dt),   w T n on the nodes of the first point, -w T n on those of the second.
 
-A block of threads finds the force T n of a spring; then a thread for each node adds those of the springs at it.
+A block of threads finds the force T n of a spring; then a thread for each node adds those of the springs at it. Where
+points have many nodes, several blocks add up parts of them first.
 
 T_s and T_d are piecewise linear, beyond their ends with the slope there. At t(n) the speed s is known half a step
 before; what T itself adds until t(n) counts, by the lightness l of both points (1/m of a mass), and what all else adds
@@ -25,13 +26,26 @@ LEAST = 1e-12  # share of the length at the start below which the direction is n
 
 
 @wp.struct
-class Springs:
-    """The springs of a model.
+class Points:
+    """The points of springs, or parts of them.
 
     Attributes:
         begin: first entry in `node` of each, and the number of all, shape (spring_count + 1,), int32.
         node: those of both points, shape (entry_count,), int32; a second point without nodes stays in place.
         weight: w of each, -w in the first point [-], shape (entry_count,), float64.
+    """
+
+    begin: wp.array(dtype=wp.int32)
+    node: wp.array(dtype=wp.int32)
+    weight: wp.array(dtype=wp.float64)
+
+
+@wp.struct
+class Springs:
+    """The springs of a model.
+
+    Attributes:
+        points: of each.
         between: way from the first to the second point in the reference configuration [m], shape (spring_count,),
             vec3d.
         direction: n where it stays as it is, else zero [-], shape (spring_count,), vec3d.
@@ -44,9 +58,7 @@ class Springs:
         y: tensions [N], float64.
     """
 
-    begin: wp.array(dtype=wp.int32)
-    node: wp.array(dtype=wp.int32)
-    weight: wp.array(dtype=wp.float64)
+    points: Points
     between: wp.array(dtype=wp.vec3d)
     direction: wp.array(dtype=wp.vec3d)
     rest: wp.array(dtype=wp.float64)
@@ -65,7 +77,7 @@ class Ends:
         node: shape (node_count,), int32.
         begin: first entry in `spring` of each, and the number of all, shape (node_count + 1,), int32.
         spring: shape (entry_count,), int32.
-        weight: as in `Springs` [-], shape (entry_count,), float64.
+        weight: as in `Points` [-], shape (entry_count,), float64.
     """
 
     node: wp.array(dtype=wp.int32)
@@ -113,15 +125,32 @@ def table_at(begin: int, end: int, x: wp.array(dtype=wp.float64), y: wp.array(dt
 
 
 @wp.func
-def ends_of(j: int, lane: int, springs: Springs, values: wp.array(dtype=wp.vec3d)):
+def ends_of(j: int, lane: int, points: Points, values: wp.array(dtype=wp.vec3d)):
     """Value of nodes at the second point of spring j, if it has nodes, less that at the first one.
 
     All threads of the block call this and get it.
     """
     found = wp.vec3d()
-    for e in range(springs.begin[j] + lane, springs.begin[j + 1], wp.block_dim()):
-        found += springs.weight[e] * values[springs.node[e]]
+    for e in range(points.begin[j] + lane, points.begin[j + 1], wp.block_dim()):
+        found += points.weight[e] * values[points.node[e]]
     return block_sum(found)
+
+
+@wp.kernel(enable_backward=False)
+def sum_parts(
+    parts: Points,
+    u: wp.array(dtype=wp.vec3d),
+    v: wp.array(dtype=wp.vec3d),
+    u_out: wp.array(dtype=wp.vec3d),
+    v_out: wp.array(dtype=wp.vec3d),
+):
+    """What each part of points adds to their displacement [m] and velocity [m/s], a block of threads for each."""
+    p, lane = wp.tid()
+    way = ends_of(p, lane, parts, u)
+    speed = ends_of(p, lane, parts, v)
+    if lane == 0:
+        u_out[p] = way
+        v_out[p] = speed
 
 
 @wp.func
@@ -158,12 +187,12 @@ def pull_springs(
 ):
     """Find the force T n of each spring [N], a block of threads for each.
 
-    `length` is L_0 [m] of each, `preload` its tension there beside that of the table [N]. With `keeps`, their state at
-    t(n) is kept: energy, what dashpots took, tension and elongation.
+    `u` and `v` are those of nodes or of parts. `length` is L_0 [m] of each, `preload` its tension there beside that of
+    the table [N]. With `keeps`, their state at t(n) is kept: energy, what dashpots took, tension and elongation.
     """
     j, lane = wp.tid()
-    between = springs.between[j] + ends_of(j, lane, springs, u)
-    speed = ends_of(j, lane, springs, v)
+    between = springs.between[j] + ends_of(j, lane, springs.points, u)
+    speed = ends_of(j, lane, springs.points, v)
     if lane == 0:
         n = direction_of(j, springs, between, length[j])
         e = wp.dot(n, between) - length[j]

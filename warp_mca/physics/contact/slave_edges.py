@@ -82,16 +82,16 @@ class SlaveEdges:
 
     def __init__(self, stage: ContactStage) -> None:
         self.carry = edge_shares.carry_kernel(stage.sides)
-        self.find = edge_shares.along_edges_kernel(stage.each, stage.sides)
+        self.find = edge_shares.along_edges_kernel(stage.each, stage.sides, stage.lanes)
         self.faces = stage.slave_faces
 
     def list_faces(self, stage: ContactStage, work: Workspace, state: State, u: wp.array) -> None:
         """Add to the lists of a search the faces along edges from nodes that slid off a side."""
         own = state.contacts[stage.index]
-        inputs = [stage.bvh.id, work.X, u, self.faces, stage.side, stage.slave_scene, stage.origin]
-        inputs += [stage.pairs_of(own), own.spring]
+        inputs = [stage.bvh.id, stage.lower, stage.upper, work.X, u, self.faces, stage.side]
+        inputs += [stage.slave_scene, stage.origin, stage.pairs_of(own), own.spring]
         lists = [own.count, own.candidate, own.face_count, own.face_slave]
-        wp.launch(self.find, len(stage.slave), inputs, [*lists, state.flag])
+        wp.launch(self.find, stage.lanes * len(stage.slave), inputs, [*lists, state.flag])
 
     def launch(self, work: Workspace, own: ContactState, split: Split) -> None:
         """Add their share of the force on each edge to the inner nodes."""

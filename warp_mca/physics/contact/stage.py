@@ -60,7 +60,7 @@ class ContactStage:
         self.kernel = (
             contact.surface_kernel(friction, self.each, self.laws, self.noted, self.general, self.slave_lanes)
             if self.sides == 1
-            else sides.sided_kernel(friction, self.each, self.sides // slots, self.laws, slots)
+            else sides.sided_kernel(friction, self.each, self.sides // slots, self.laws, slots, self.slave_lanes)
         )
         self.react = contact.react_kernel(self.each, self.lanes, self.noted)
         self.bounds = search.bounds_kernel(self.each)
@@ -83,11 +83,11 @@ class ContactStage:
         self.slave = wp.array(self._join("slave"), dtype=wp.int32)
         self.stiffness = wp.array(self._join("stiffness"), dtype=wp.float64)
         self.lanes = contact.LANES if wp.get_device().is_cuda and not self.on_plane else 1
-        self.slave_lanes = contact.slave_lanes(self.lanes, len(self.slave)) if self.sides == 1 else 1
         self.mu, self.overlaps = numbers([item.mu for item in items]), {item.initial_overlap for item in items}
         self.may_rest = items[0].plane is None or self.overlaps != {"refuse"} or model.fails
         bonded, pressed = any(item.bonds is not None for item in items), "press" in self.overlaps
         self.laws = Laws(items[0].law, items[0].friction, bonded, pressed, any(item.returns for item in items))
+        self.slave_lanes = contact.slave_lanes(self.lanes, len(self.slave), self.sides, bonded)
         check_dashpots(items)
         rows = np.repeat([item.parameters for item in items], np.diff(self.springs), axis=0)
         self.parameters = wp.array(rows, dtype=wp.float64, ndim=2)
@@ -171,8 +171,8 @@ class ContactStage:
 
     @property
     def blocks(self) -> int:
-        """Blocks of threads that look at the slaves."""
-        return -(-self.slave_lanes * len(self.slave) // contact.BLOCK_DIM)
+        """Blocks of threads that look at the slaves, most of which are idle where a master has sides."""
+        return -(-(self.slave_lanes if self.sides == 1 else 1) * len(self.slave) // contact.BLOCK_DIM)
 
     def kernels(self) -> list[Any]:
         """Those of a step."""

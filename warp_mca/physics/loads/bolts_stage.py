@@ -74,11 +74,12 @@ class BoltsStage(SpringsStage):
         state, kept = step.state.parts[self.name], bolt.ShankState()
         for key in ("length", "preload", "turned", "work"):
             setattr(kept, key, getattr(state, key))
-        inputs = [self.springs, self.shanks.tightens, step.state.u]
+        motion = self.motion(step.state)
+        inputs = [self.springs, self.shanks.tightens, motion[0]]
         wp.launch(bolt.stretch_bolts, (self.count, self.lanes), inputs=inputs, outputs=[self.L], block_dim=BLOCK)
         inputs = [self.springs, self.shanks, state.elongation, self.L, 0.0 if start else self.dt]
         wp.launch(bolt.tighten_bolts, len(self.items), inputs=inputs, outputs=[kept])
-        self.pull(step, start, state.length, state.preload)
+        self.pull(step, start, state.length, state.preload, motion)
 
     def energies_of(self, state: State) -> Sequence[wp.array]:
         """Stored, and given by what tightens them."""
@@ -87,7 +88,7 @@ class BoltsStage(SpringsStage):
 
     def readings_of(self, state: State) -> Sequence[wp.array]:
         """Axial and shear force."""
-        inputs = [self.shanks.begin, self.springs, state.parts[self.name].tension, state.u]
+        inputs = [self.shanks.begin, self.springs, state.parts[self.name].tension, self.motion(state)[0]]
         outputs = [self.axial, self.shear]
         threads = (len(self.items), self.lanes)
         wp.launch(bolt.read_bolts, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK)

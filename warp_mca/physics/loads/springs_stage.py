@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from warp_mca.system.actor import System
     from warp_mca.system.state import State
 
-BLOCK = 256  # threads of a GPU for a spring
+BLOCK = 256  # threads of a GPU for a spring, or for a part of its points
+PART = 8 * BLOCK  # entries of a part: one multiprocessor would read those of long lists alone
 
 
 @dataclass(eq=False)
@@ -56,8 +57,11 @@ class SpringsStage(NodalLoad):
         node = np.concatenate([item.node for item in items])
         weight = np.concatenate([item.weight for item in items])
         counts = [len(item.node) for item in items]
-        own.begin = wp.array(offsets(counts), dtype=wp.int32)
-        own.node, own.weight = wp.array(node, dtype=wp.int32), wp.array(weight, dtype=wp.float64)
+        self.lanes = BLOCK if wp.get_device().is_cuda else 1
+        self.points, self.parts = _points(counts, node, weight), None
+        if max(counts) > PART:
+            self._divide(counts)
+        own.points = self.points
         for key in ("between", "direction"):
             setattr(own, key, wp.array([getattr(item, key) for item in items], dtype=wp.vec3d))
         for key in ("rest", "lowest", "lightness"):
@@ -69,7 +73,23 @@ class SpringsStage(NodalLoad):
         self.length, self.preload = self.numbers("length"), self.numbers("preload")
         self.springs, self.dt = own, solver.common_dt
         self.ends, self.force = _ends(node, weight, counts), wp.zeros(self.count, dtype=wp.vec3d)
-        self.lanes = BLOCK if wp.get_device().is_cuda else 1
+
+    def _divide(self, counts: list[int]) -> None:
+        """Let points be sums of parts."""
+        sizes = [min(PART, count - k) for count in counts for k in range(0, count, PART)]
+        self.parts, total = self.points, len(sizes)
+        self.parts.begin = wp.array(offsets(sizes), dtype=wp.int32)
+        numbers = [-(-count // PART) for count in counts]
+        self.points = _points(numbers, np.arange(total, dtype=np.int32), np.ones(total))
+        self.sums = [wp.zeros(total, dtype=wp.vec3d) for _ in range(2)]
+
+    def motion(self, state: State) -> Sequence[wp.array]:
+        """Displacements [m] and velocities [m/s] that `springs.points` weigh, of nodes or of parts of points."""
+        if self.parts is None:
+            return [state.u, state.v]
+        threads = (len(self.sums[0]), self.lanes)
+        wp.launch(spring.sum_parts, threads, [self.parts, state.u, state.v], self.sums, block_dim=BLOCK)
+        return self.sums
 
     def entries(self, item: Any) -> int:
         """One for each spring."""
@@ -87,18 +107,18 @@ class SpringsStage(NodalLoad):
 
     def record_kernels(self) -> list[Any]:
         """Those of a step, which have blocks of Warp's own size."""
-        return [*super().record_kernels(), spring.pull_springs, spring.add_pulls]
+        return [*super().record_kernels(), spring.sum_parts, spring.pull_springs, spring.add_pulls]
 
     def push(self, step: Step, start: bool = False) -> None:
         """Add the forces of all springs."""
-        self.pull(step, start, self.length, self.preload)
+        self.pull(step, start, self.length, self.preload, self.motion(step.state))
 
-    def pull(self, step: Step, start: bool, length: wp.array, preload: wp.array) -> None:
-        """Add them with L_0 [m] and the preload [N] of each, shape (count,), float64."""
+    def pull(self, step: Step, start: bool, length: wp.array, preload: wp.array, motion: Sequence[wp.array]) -> None:
+        """Add them with L_0 [m] and the preload [N] of each, shape (count,), float64, and the `motion` of points."""
         state, work, kept = step.state, self.work, spring.SpringState()
         for field in fields(SpringsState):
             setattr(kept, field.name, getattr(state.parts[self.name], field.name))
-        inputs = [self.springs, length, preload, state.u, state.v, self.dt, not start]
+        inputs = [self.springs, length, preload, *motion, self.dt, not start]
         threads, outputs = (self.count, self.lanes), [self.force, kept]
         wp.launch(spring.pull_springs, threads, inputs=inputs, outputs=outputs, block_dim=BLOCK)
         wp.launch(spring.add_pulls, len(self.ends.node), inputs=[self.ends, self.force], outputs=[work.nodal_force])
@@ -122,6 +142,13 @@ class SpringsStage(NodalLoad):
         """Tension and elongation."""
         own = state.parts[self.name]
         return [own.tension, own.elongation]
+
+
+def _points(counts: Sequence[int], node: Index, weight: Array) -> Any:
+    own = spring.Points()
+    own.begin = wp.array(offsets(counts), dtype=wp.int32)
+    own.node, own.weight = wp.array(node, dtype=wp.int32), wp.array(weight, dtype=wp.float64)
+    return own
 
 
 def _ends(node: Index, weight: Array, counts: list[int]) -> Any:
