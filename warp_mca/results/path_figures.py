@@ -27,7 +27,7 @@ NEAR = 0.05  # share of a path that does not set the height of paths.png
 DECADES = 3.0  # of stress in waves.png: the first wave is weak
 FIRST = 0.3  # share of the time that they span: while the first wave travels and reflects
 GAP = 2.5  # times the usual distance between probes is a gap between the lines of a path
-WAVES = {"bar": r"$\sqrt{E/\rho}$", "dilatational": r"$c_d$", "shear": r"$c_s$"}
+WAVES = {"bar": "bar wave", "dilatational": "dilatational wave", "shear": "shear wave"}
 STYLES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 2)))
 
 
@@ -103,7 +103,9 @@ def plot_waves(
         value = scale * stress.T
         norm = LogNorm(top / 10.0**DECADES, top, clip=True)
         image = axes.pcolorfast(_edges(1e6 * time), _edges(1e3 * position), value, norm=norm, cmap="viridis")
-        figure.colorbar(image, ax=axes, extend="both").set_label(f"von Mises [{unit}]")
+        bar = figure.colorbar(image, ax=axes, extend="both", format="%g")  # powers of ten take 0.15 s to be parsed
+        bar.minorticks_off()
+        bar.set_label(f"von Mises [{unit}]")
         _draw_speeds(axes, path, speeds)
         axes.set_xlim(0.0, 1e6 * float(time[-1]))
         axes.set_ylim(1e3 * float(path.position[0]), 1e3 * float(path.position[-1]))
@@ -137,7 +139,7 @@ def _draw_speeds(axes: Axes, path: PathHistory, speeds: Mapping[str, float]) -> 
 
     far = float(path.position[-1])
     for (label, speed), style in zip(speeds.items(), ("-", "--", ":"), strict=False):
-        name = f"{label} = {speed:.0f} m/s"
+        name = f"{label} {speed:.0f} m/s"
         ends = [0.0, 1e6 * far / speed], [0.0, 1e3 * far]
         line = axes.plot(*ends, color="white", linestyle=style, label=name, linewidth=1.2)[0]
         # White on a black rim: seen on every colour of the palette.
