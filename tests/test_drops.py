@@ -176,7 +176,8 @@ QUICK = ["--duration", "1e-6", "--set", "across=0.5", "--set", "struck=off"]
 
 
 def test_a_command_runs_a_drop(folder: Path):
-    assert main(["run", "part.step", "--height", "1.2", "--onto", "wood", "--pose", "corner", *QUICK]) == 0
+    words = ["--onto", "wood", "--pose", "corner", *QUICK, "--set", "penalty=2"]
+    assert main(["run", "part.step", "--height", "1.2", *words]) == 0
     result = load("part-drop")
     given = {"height": 1.2, "onto": "wood", "pose": "corner"}
     assert {name: result.summary["parameters"][name] for name in given} == given

@@ -165,6 +165,7 @@ def test_sizes_of_their_own_are_told_where_they_are_coarse(block: Path):
     scenes = [mca.drop_test(ball, height=HEIGHT, struck=struck) for struck in ("auto", "off", 0.5e-3)]
     given, off, fine = results = [mca.run(scene, duration=1.8e-5) for scene in scenes]
     assert [scene.listed[0].penalty for scene in scenes] == [None, None, 10.0]
+    assert mca.drop_test(ball, height=HEIGHT, struck=0.5e-3, penalty=2.0).listed[0].penalty == 2.0
     told = [[text for text in result.warnings if "the fall crushes ball" in text] for result in results]
     assert given.F_n.max() == off.F_n.max() < 0.8 * fine.F_n.max()
     assert [len(texts) for texts in told] == [1, 1, 0]

@@ -40,12 +40,13 @@ def build(
     onto: Annotated[str, mca.Param("floor", choices=("rigid", "steel", "concrete", "wood"))] = "rigid",
     mu: Annotated[float, mca.Param("coefficient of friction", "-", low=0.0)] = 0.2,
     struck: Annotated[str, mca.Param("size of cells where it strikes [m], auto or off")] = "auto",
+    penalty: Annotated[float | None, mca.Param("of the floor's springs", "-", low=0.0, exclusive=True)] = None,
     material: Annotated[str, mca.Param("of mca.library", choices=("steel", *mca.library.materials()))] = "steel",
 {more}) -> mca.Scene:
     steel = mca.J2Bilinear(E=210e9, nu=0.3, rho=7850.0, sigma_y=250e6, E_t=1e9)
     chosen = {{"steel": steel, **mca.library.materials()}}[material]
 {parts}
-    return mca.drop_test(parts, height=height, pose=pose, onto=onto, mu=mu, struck=struck)
+    return mca.drop_test(parts, height=height, pose=pose, onto=onto, mu=mu, struck=struck, penalty=penalty)
 '''
 _ACROSS = '    across: Annotated[float, mca.Param("elements over a wall", "-", low=0.25, high=64.0)] = 1.0,\n'
 _SCALE = '    scale: Annotated[float, mca.Param("metres for one unit of the file", "m", low=1e-12)] = {scale!r},\n'

@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import product
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -58,6 +58,7 @@ def drop_test(
     contacts: Sequence[Contact | ContactAll] = (),
     gravity: float = 9.81,
     struck: float | str = "auto",
+    penalty: float | Literal["auto"] | None = None,
     impact: ImpactPhase | None = None,
     name: str = "drop",
     **more: Any,
@@ -75,9 +76,10 @@ def drop_test(
         mu: coefficient of friction on the floor [-].
         contacts: of the bodies with each other; they become `internal`, so that F_n is the floor's.
         gravity: g [m/s^2].
-        struck: greatest edge of cells where a `Cad` or an `Assembly` strikes [m]; such bodies take strains as large and
-            have penalty=10 on the floor. "auto": on an edge, a corner or a round place that yields, the depth that the
+        struck: greatest edge of cells where a `Cad` or an `Assembly` strikes [m]; such bodies take strains as large.
+            "auto": on an edge, a corner or a round place that yields, the depth that the
             fall crushes over `across`, or a quarter of the size without; a `size` of a body stays. "off": none.
+        penalty: of the contact of all bodies with the floor, as in `Contact`; None: 10 of bodies with finer cells.
         impact: its phase; None: 400 rows over 20 passes of a wave in metal along the parts, or their contact if longer.
         name, more: of the scene, with other fields of it, as `criteria`; places in space are those above the floor.
 
@@ -101,7 +103,7 @@ def drop_test(
     return Scene(
         name=name,
         bodies=tuple(body.drop(height, down) for body in placed) + ((floor,) if floor else ()),
-        contacts=_contacts(contacts, bodies, placed, floor, mu),
+        contacts=_contacts(contacts, bodies, placed, floor, mu, penalty),
         absorbing=(*more.pop("absorbing", ()), *sides),
         gravity=down,
         impact=impact or _phase(extent, placed, math.sqrt(2.0 * gravity * height), FLOORS[onto]),
@@ -169,10 +171,11 @@ def _contacts(
     placed: Sequence[Body],
     floor: Body | None,
     mu: float,
+    penalty: float | Literal["auto"] | None,
 ) -> tuple[Contact | ContactAll, ...]:
     """The contacts of the bodies with each other, and of each with the floor, which has none with itself.
 
-    Springs are stiffer of bodies whose geometry in their place has finer cells.
+    Without a penalty springs are stiffer of bodies whose geometry in their place has finer cells.
     """
     master = Surface(body="floor", nodes="zmax") if floor else RigidPlane(normal=(0.0, 0.0, 1.0))
     skins = [Surface(body=body.name, nodes="boundary") for body in bodies if not body.is_inertia]
@@ -181,7 +184,8 @@ def _contacts(
         itself = ("floor", "floor")
         among = [replace(c, exclude=(*c.exclude, itself)) if isinstance(c, ContactAll) else c for c in among]
     finer = {b.name: PENALTY for a, b in zip(bodies, placed, strict=True) if _places(a) != _places(b)}
-    return (*among, *(Contact(slave=skin, master=master, mu=mu, penalty=finer.get(skin.body)) for skin in skins))
+    chosen = {skin.body: finer.get(skin.body) if penalty is None else penalty for skin in skins}
+    return (*among, *(Contact(slave=skin, master=master, mu=mu, penalty=chosen[skin.body]) for skin in skins))
 
 
 def _places(body: Body) -> object:

@@ -10,7 +10,7 @@ from warp_mca.watch.row import Finished, Values, row
 
 @row(
     "bolt {name} bore a compression of {force:.3g} N, as a stud does; the head of a screw would lift and bear none;",
-    "if it has one, give it its preload, or let its bodies press on each other beside it",
+    "if it has one, {remedy}, or let its bodies press on each other beside it",
     0.05,
     "of its greatest tension or shear force at most",
 )
@@ -20,4 +20,5 @@ def bolt_in_compression(c: Finished, most: float) -> Iterator[Values]:
         axial, shear = (c.history[column.format(bolt.name)] for column in bolt.readings)
         force, other = -float(axial.min()), float(max(axial.max(), shear.max()))
         if force > most * other:
-            yield dict(name=bolt.name, force=force)
+            remedy = "raise its preload" if bolt.preload else "give it its preload"
+            yield dict(name=bolt.name, force=force, remedy=remedy)
