@@ -74,3 +74,25 @@ def test_faces_without_a_solid_are_told(tmp_path: Path):
     mesh = mca.Cad(file, size=8e-3).build()
     assert mesh.notes == ("faces of shell.step that bound no solid are left out: 1",)
     assert np.ptp(mesh.points[:, 2]) == pytest.approx(5e-3)
+
+
+def test_an_overlap_is_told_where_it_is(tmp_path: Path):
+    """The middle of what a pressed sleeve shares with its shaft lies on the axis, outside of the sleeve."""
+    import gmsh
+
+    file, r, over = tmp_path / "sleeve.step", 5.0, 0.1
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.model.occ.addCylinder(0, 0, 0, 0, 0, 20, r + over)
+        sleeve, bore = (gmsh.model.occ.addCylinder(0, 0, 5, 0, 0, 10, radius) for radius in (8.0, r))
+        gmsh.model.occ.cut([(3, sleeve)], [(3, bore)])
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(file))
+    finally:
+        gmsh.finalize()
+    (touch,) = mca.Assembly(file, materials={"*": mca.library.ABS}, size=4e-3).touching
+    x, y, z = touch.at
+    assert r <= 1e3 * np.hypot(x, y) * (1.0 + 1e-9) <= r + over
+    assert z == pytest.approx(10e-3)
+    assert touch.depth == pytest.approx(1e-3 * over, rel=0.02)

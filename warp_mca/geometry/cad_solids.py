@@ -188,7 +188,10 @@ def _area(model: Any, solid: int) -> float:
 
 
 def _shared(model: Any, one: int, other: int, at: Array) -> tuple[float, Array]:
-    """Mean thickness and middle of what two solids share, in the model's unit; 0 and `at` where they only touch."""
+    """Mean thickness of what two solids share, and the point of it nearest to its middle, which a ring has outside.
+
+    In the model's unit; 0 and `at` where they only touch.
+    """
     found, _ = model.occ.intersect([(3, one)], [(3, other)], removeObject=False, removeTool=False)
     pieces = [tag for dim, tag in found if dim == 3]
     depth = 0.0
@@ -198,7 +201,9 @@ def _shared(model: Any, one: int, other: int, at: Array) -> tuple[float, Array]:
         greatest = max(volume, key=lambda tag: volume[tag])
         if volume[greatest] > 0.0:
             depth = 2.0 * volume[greatest] / _area(model, greatest)
-            at = np.array(model.occ.getCenterOfMass(3, greatest))
+            middle = model.occ.addPoint(*model.occ.getCenterOfMass(3, greatest))
+            at = np.array(model.occ.getDistance(0, middle, 3, greatest)[4:])
+            model.occ.remove([(0, middle)])
     if found:
         model.occ.remove(found, recursive=True)
         model.occ.synchronize()
