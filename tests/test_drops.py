@@ -203,6 +203,7 @@ def test_a_command_runs_all_poses_and_names_the_worst(
         (["part.step", "--height", "-1"], "height = -1.0: give a finite number [m], above 0"),
         (["part.step", "--onto", "sand"], "onto = 'sand': choose rigid or steel or concrete or wood"),
         (["part.step", "--pose", "top"], "drop_test.pose = 'top'"),
+        (["part.step", "--height", "1", "--set", "penalty=x"], "penalty = 'x': give a finite number, above 0 or auto"),
         (["part.step", "--height", "1", "--set", "height=2"], "it is given as height=2, too"),
         (
             ["part.step", "--height", "1", "--checkpoint", "30w"],

@@ -214,3 +214,17 @@ def test_what_springs_take_of_a_thin_plate_that_lands_flat_is_said(layers: int, 
     assert -loss == pytest.approx(1.0 - result.F_n.max() / wave, abs=0.01)
     assert least <= -loss < most
     assert any("of plate–plane was greatest: its peak is some" in text for text in result.warnings) == (-loss > 0.03)
+
+
+def test_what_is_said_of_soft_springs_below_a_flat_end_can_be_done():
+    """Springs that stiff ask for shorter steps where cells are thin across: the balance of energy stopped such runs."""
+    box = mca.Box(size=(0.02, 0.02, 0.01), divisions=(4, 4, 2))
+    block = mca.Body(name="block", geometry=box, material=replace(STEEL, nu=0.3))
+    soft, stiff = (mca.drop_test(block, height=1.0, pose="zmin", penalty=penalty) for penalty in (None, 2.0))
+    (text,) = (text for text in mca.run(soft).warnings if "springs held" in text)
+    assert "give the contact penalty=2 and a time_step_scale at which its energy balance holds" in text
+    with pytest.raises(mca.GuardError, match="lower time_step_scale"):
+        mca.run(stiff)
+    result = mca.run(replace(stiff, impact=replace(stiff.impact, time_step_scale=0.6)))
+    assert result.summary["energy_error"] < stiff.impact.energy_tolerance
+    assert not any("springs held" in text for text in result.warnings)

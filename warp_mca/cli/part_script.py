@@ -40,7 +40,9 @@ def build(
     onto: Annotated[str, mca.Param("floor", choices=("rigid", "steel", "concrete", "wood"))] = "rigid",
     mu: Annotated[float, mca.Param("coefficient of friction", "-", low=0.0)] = 0.2,
     struck: Annotated[str, mca.Param("size of cells where it strikes [m], auto or off")] = "auto",
-    penalty: Annotated[float | None, mca.Param("of the floor's springs", "-", low=0.0, exclusive=True)] = None,
+    penalty: Annotated[
+        float | None, mca.Param("factor of the floor's contact stiffness", low=0.0, exclusive=True, words=("auto",))
+    ] = None,
     material: Annotated[str, mca.Param("of mca.library", choices=("steel", *mca.library.materials()))] = "steel",
 {more}) -> mca.Scene:
     steel = mca.J2Bilinear(E=210e9, nu=0.3, rho=7850.0, sigma_y=250e6, E_t=1e9)

@@ -65,7 +65,8 @@ def soft_springs(c: Finished, most: float) -> Iterator[Values]:
             if springs.where == "edges":
                 remedy = "give the contact penalty=10 and refine the mesh there until its peak no longer changes"
             elif contact.penalty is None and springs.where == "flat":  # stiffer ones ring there: 2 rho c A v with 10
-                remedy = "give the contact penalty=2, or refine the mesh there"
+                remedy = "give the contact penalty=2 and a time_step_scale at which its energy balance holds, "
+                remedy += "or refine the mesh there"
             elif contact.penalty is None and k not in curved:
                 remedy = "give the contact penalty=10, or refine the mesh there"
             elif contact.penalty is not None and k in curved:
