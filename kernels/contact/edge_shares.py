@@ -112,13 +112,9 @@ def along_edges_kernel(each: bool, sides: int, lanes: int = 1) -> Any:
         face_slave_out: wp.array2d(dtype=wp.int32),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
-        lane = wp.tid() % wp.static(lanes)
-        s = wp.tid() // wp.static(lanes)
-        i = slaves.node[s]
-        k = of(scene, s)
-        slid = bool(False)
-        listed = int(0)
-        known = Counts()  # entries of lists before the first thread adds some
+        lane, s = wp.tid() % wp.static(lanes), wp.tid() // wp.static(lanes)
+        i, k = slaves.node[s], of(scene, s)
+        slid, listed, known = bool(False), int(0), Counts()  # entries of lists before the first thread adds some
         for p in range(wp.static(sides)):
             e = wp.static(sides) * s + p
             slid = slid or slid_off(e, spring)
@@ -149,12 +145,12 @@ def along_edges_kernel(each: bool, sides: int, lanes: int = 1) -> Any:
                         for q in range(wp.static(lanes.bit_length() - 1)):
                             again += exchange(again, 1 << q)
                             met += exchange(met, 1 << q)
-                    if lane == 0 and met > wp.float64(0.0) and again == wp.float64(0.0):
-                        found = count_out[row]
-                        if found < candidate_out.shape[1]:  # a list that is full takes no further faces
-                            candidate_out[row, found] = f
-                            count_out[row] = found + 1
-                            list_slave(f, row, k, face_count_out, face_slave_out, flag_out)
+                    found = count_out[row]  # a list that is full takes no further faces
+                    new = met > wp.float64(0.0) and again == wp.float64(0.0) and found < candidate_out.shape[1]
+                    if new and lane == 0:
+                        candidate_out[row, found] = f
+                        count_out[row] = found + 1
+                        list_slave(f, row, k, face_count_out, face_slave_out, flag_out)
         if lane == 0:
             for p in range(wp.static(sides)):  # crossings lie on seams, where the first of equally near faces is taken
                 sort_row(wp.static(sides) * s + p, count_out[wp.static(sides) * s + p], candidate_out)

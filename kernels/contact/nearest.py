@@ -222,9 +222,6 @@ def nearest_again(
     """What `nearest_face` found, for the face that it chose, or none if f is -1; without the faces in front."""
     near = Nearest()
     near.face = f
-    near.front = wp.float64(FAR)
-    near.front_face = -1
-    near.front_rank = wp.float64(FAR)
     if f >= 0:
         _, at, away, area_normal, triangle = project_on_face(X, u, face, f, x)
         near.area = wp.length(area_normal)
@@ -237,10 +234,7 @@ def nearest_again(
 
 @cache
 def shared_function(lanes: int, exchange: Any) -> Any:
-    """The function that gives what `lanes` threads of a GPU found together of what `nearest_face` gives.
-
-    That is front, front_rank, front_face and face of all their candidates; `exchange` gives values of other lanes.
-    """
+    """The function that gives front, front_rank, front_face and face of all candidates that `lanes` threads share."""
 
     @wp.func
     def shared(X: wp.array(dtype=wp.vec3d), u: wp.array(dtype=wp.vec3d), master: Master, near: Nearest):

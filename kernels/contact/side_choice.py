@@ -240,6 +240,8 @@ def choice_functions(friction: bool, sides: int) -> tuple[Any, Any]:
                 found.begins = wp.max(approach, wp.float64(0.0))
         if wp.static(friction):
             found.slip = slip_normal(at, e, near, node.begin, spring)
+        found.own = greatest_stiffness(at, s, near.face)
+        found.limit = found.own
         return found
 
     return choose, confirm

@@ -87,11 +87,12 @@ def fronts_type(sides: int) -> Any:
 
 
 @cache
-def front_functions(sides: int, lanes: int) -> tuple[Any, Any, Any]:
+def front_functions(sides: int, lanes: int) -> tuple[Any, Any, Any, Any]:
     """The functions that find and use the faces near a node.
 
     `near_faces` looks at the candidates of all sides, which `lanes` threads of a GPU share. `near_side` gives what
-    `nearest_face` finds for a side. `may_press` says whether the nearest face can press the node, given the faces of
+    `nearest_face` finds for a side, `least_gap` the least distance to a face in front, if several sides have candidates
+    [m]. `may_press` says whether the nearest face can press the node, given the faces of
     the other sides and whether its own side `pressed` the node before.
     """
     Gaps, Faces = wp.types.vector(sides, wp.float64), wp.types.vector(sides, wp.int32)
@@ -128,6 +129,14 @@ def front_functions(sides: int, lanes: int) -> tuple[Any, Any, Any]:
         return near
 
     @wp.func
+    def least_gap(node: NodeSprings, fronts: Fronts) -> wp.float64:
+        least = wp.float64(FAR)
+        if node.listed > 1:
+            for p in range(wp.static(sides)):
+                least = wp.min(least, fronts.gap[p])
+        return least
+
+    @wp.func
     def may_press(
         at: Surfaces,
         s: int,
@@ -151,4 +160,4 @@ def front_functions(sides: int, lanes: int) -> tuple[Any, Any, Any]:
                     found = bool(False)
         return found
 
-    return near_faces, near_side, may_press
+    return near_faces, near_side, least_gap, may_press

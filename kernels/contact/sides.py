@@ -14,7 +14,7 @@ from warp_mca.kernels.contact.bond import hold_node
 from warp_mca.kernels.contact.contact import BLOCK_DIM
 from warp_mca.kernels.contact.edge_rest import release_function
 from warp_mca.kernels.contact.edge_shares import has_support
-from warp_mca.kernels.contact.edges import Surfaces, greatest_stiffness
+from warp_mca.kernels.contact.edges import Surfaces
 from warp_mca.kernels.contact.laws import PLAIN, Laws
 from warp_mca.kernels.contact.search import STALE, moved_too_far
 from warp_mca.kernels.contact.settle import meet, settle_functions
@@ -24,7 +24,7 @@ from warp_mca.kernels.contact.side_choice import (
     springs_function,
 )
 from warp_mca.kernels.contact.side_reach import front_functions
-from warp_mca.kernels.contact.spring import FAR, Spring, pressure_function
+from warp_mca.kernels.contact.spring import Spring, pressure_function
 from warp_mca.kernels.contact.way_back import note_way, recent, way_ends
 from warp_mca.kernels.hardware.early_launch import begins_early, let_next_begin, wait_for_previous
 from warp_mca.kernels.hardware.per_scene import kind, value_function
@@ -50,7 +50,7 @@ def sided_kernel(friction: bool, each: bool, sides: int, laws: Laws = PLAIN, slo
     settle, _, leave = settle_functions(friction, laws)
     choose, confirm = choice_functions(friction, sides)
     pressure, springs_of_node = pressure_function(friction), springs_function(friction, sides)
-    near_faces, near_side, may_press = front_functions(sides, lanes)
+    near_faces, near_side, least_gap, may_press = front_functions(sides, lanes)
     release = release_function(friction, sides, laws)
     of, Real, Index = value_function(each), kind(wp.float64, each), kind(wp.int32, each)
 
@@ -73,8 +73,7 @@ def sided_kernel(friction: bool, each: bool, sides: int, laws: Laws = PLAIN, slo
     ):
         wait_for_previous()
         let_next_begin()
-        lane = wp.tid() % wp.static(lanes)
-        s = first + wp.tid() // wp.static(lanes)
+        lane, s = wp.tid() % wp.static(lanes), first + wp.tid() // wp.static(lanes)
         i, k = at.slaves.node[s], of(scene, s)
         x, total, scale, active = at.X[i] + at.u[i], wp.vec3d(), of(per_newton, k), bool(False)
         start, end = wp.static(sides * slots) * s, wp.static(sides * slots) * (s + 1)
@@ -85,11 +84,8 @@ def sided_kernel(friction: bool, each: bool, sides: int, laws: Laws = PLAIN, slo
             node = springs_of_node(begin, at.master.count, spring)
             along = wp.vec3f(node.pressed)
             fronts = near_faces(at, node, x, along, lane)
-            front = wp.float64(FAR)
-            if node.listed > 1:
-                for p in range(wp.static(sides)):
-                    front = wp.min(front, fronts.gap[p])
-            choice = first_choice(node)
+            front = least_gap(node, fronts)
+            pick = first_choice(node)
             active = active or node.active
             begins = wp.where(node.listed > 1, 0, wp.where(node.active, 1, 2))
             for step in range(wp.where(lane == 0, begins, 2), 2):
@@ -103,19 +99,15 @@ def sided_kernel(friction: bool, each: bool, sides: int, laws: Laws = PLAIN, slo
                         touch = meet(v, at.master.face, i, near, dt, held, wp.vec3f(pressure(e, spring)))
                         touches = may_press(at, s, near, held, pressed, touch.du, node, fronts, recent_out)
                         if step == 0:
-                            choice = choose(
-                                at, s, e, near, touch, touches, fronts.below, node, choice, spring, recent_out
-                            )
+                            pick = choose(at, s, e, near, touch, touches, fronts.below, node, pick, spring, recent_out)
                         else:
-                            touch = confirm(at, s, e, near, touch, touches, node, choice, spring)
-                            touch.own = greatest_stiffness(at, s, near.face)
-                            touch.limit = touch.own
+                            touch = confirm(at, s, e, near, touch, touches, node, pick, spring)
                             total += leave(e, i, at.X, at.u, v, at.master, touch, spring)
                             total += settle(e, k, near, touch, of(mu, k), scale, spring, normal_force_out, flag_out)
                             note_way(e, touch.touches, ends, spring)
                     elif step == 1:
                         total += release(
-                            at, v, s, e, k, near, node, choice.newcomer, ends, fronts, along,
+                            at, v, s, e, k, near, node, pick.newcomer, ends, fronts, along,
                             of(mu, k), scale, dt, spring, normal_force_out, recent_out, flag_out
                         )  # fmt: skip
         if active and lane == 0:

@@ -67,19 +67,17 @@ def drop_test(
 
     Args:
         parts: a body, several, or an assembly with its contacts; they are meshed for their boxes and their mass.
-        height: of the fall from rest [m].
+        height, gravity: of the fall from rest [m], and g [m/s^2].
         pose: what of the box around the parts meets the floor: one of `POSES`, as "zmin" for a face, "xmax-zmin" for an
             edge, "xmin-ymax-zmin" for a corner; or "face", "edge" or "corner" for the one at least x, y and z. The
             centre of mass is above an edge or a corner. "A/B": turned by A about x, then by B about y [degrees].
         onto: "rigid", or a floor of "steel", "concrete" or "wood" (`mca.library` has their source): an elastic block
             whose other sides let waves out, with 20 cells over 1.25 times the diagonal of the parts.
-        mu: coefficient of friction on the floor [-].
+        mu, penalty: of the contact of all bodies with the floor, as in `Contact`; None: 10 of bodies with finer cells.
         contacts: of the bodies with each other; they become `internal`, so that F_n is the floor's.
-        gravity: g [m/s^2].
         struck: greatest edge of cells where a `Cad` or an `Assembly` strikes [m]; such bodies take strains as large.
             "auto": on an edge, a corner or a round place that yields, the depth that the
             fall crushes over `across`, or a quarter of the size without; a `size` of a body stays. "off": none.
-        penalty: of the contact of all bodies with the floor, as in `Contact`; None: 10 of bodies with finer cells.
         impact: its phase; None: 400 rows over 20 passes of a wave in metal along the parts, or their contact if longer.
         name, more: of the scene, with other fields of it, as `criteria`; places in space are those above the floor.
 
@@ -184,6 +182,7 @@ def _contacts(
         itself = ("floor", "floor")
         among = [replace(c, exclude=(*c.exclude, itself)) if isinstance(c, ContactAll) else c for c in among]
     finer = {b.name: PENALTY for a, b in zip(bodies, placed, strict=True) if _places(a) != _places(b)}
+    chosen: dict[str, float | Literal["auto"] | None]
     chosen = {skin.body: finer.get(skin.body) if penalty is None else penalty for skin in skins}
     return (*among, *(Contact(slave=skin, master=master, mu=mu, penalty=chosen[skin.body]) for skin in skins))
 
