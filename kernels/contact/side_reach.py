@@ -91,9 +91,9 @@ def front_functions(sides: int, lanes: int) -> tuple[Any, Any, Any, Any]:
     """The functions that find and use the faces near a node.
 
     `near_faces` looks at the candidates of all sides, which `lanes` threads of a GPU share. `near_side` gives what
-    `nearest_face` finds for a side, `least_gap` the least distance to a face in front, if several sides have candidates
-    [m]. `may_press` says whether the nearest face can press the node, given the faces of
-    the other sides and whether its own side `pressed` the node before.
+    `nearest_face` finds for a side, `least_gap` the least distance [m] to a face in front, if several sides have
+    candidates. `may_press` says whether the nearest face can press the node, given the faces of the other sides and
+    whether its own side `pressed` the node before.
     """
     Gaps, Faces = wp.types.vector(sides, wp.float64), wp.types.vector(sides, wp.int32)
     Fronts, shared = fronts_type(sides), shared_function(lanes, group_exchange(lanes))

@@ -76,8 +76,8 @@ def drop_test(
         mu, penalty: of the contact of all bodies with the floor, as in `Contact`; None: 10 of bodies with finer cells.
         contacts: of the bodies with each other; they become `internal`, so that F_n is the floor's.
         struck: greatest edge of cells where a `Cad` or an `Assembly` strikes [m]; such bodies take strains as large.
-            "auto": on an edge, a corner or a round place that yields, the depth that the
-            fall crushes over `across`, or a quarter of the size without; a `size` of a body stays. "off": none.
+            "auto": on an edge, a corner or a round place that yields, the depth that the fall crushes over `across`, or
+            a quarter of the size without; a `size` of a body stays. "off": none.
         impact: its phase; None: 400 rows over 20 passes of a wave in metal along the parts, or their contact if longer.
         name, more: of the scene, with other fields of it, as `criteria`; places in space are those above the floor.
 
