@@ -29,10 +29,12 @@ from warp_mca.step.sensor_stage import SensorStage
 from warp_mca.step.solver import Solver
 from warp_mca.step.state_figures import at_last_record
 from warp_mca.step.steps import Steps
+from warp_mca.step.transfer import Transfer
 from warp_mca.system.reading import on_host
 from warp_mca.system.records import SceneRecords
 from warp_mca.system.state import State
 from warp_mca.watch.bent_scenes import Together
+from warp_mca.watch.looks import Looks
 from warp_mca.watch.passing import Watch
 
 if TYPE_CHECKING:
@@ -61,7 +63,11 @@ class Impact:
         recording: recorders of a lone scene, or None.
         controls: what asks controllers, of which a batch has none.
         exposed: what follows the surface of a lone scene's elements as they fail, or None.
+        ways: how records and looks came to the host in the latest call of `advance`; the next one takes them if it can.
     """
+
+    recording: Recording | None = None
+    ways: tuple[Transfer[str], Looks] | None = None
 
     def __init__(
         self,
@@ -113,7 +119,6 @@ class Impact:
         self.controls = Controls(self.ready[0].scene, self.state)
         self.exposed = Exposed(self.ready[0], self.solver, self.state) if model.fails and len(ready) == 1 else None
         self.stopped: list[str | None] = [None] * len(self.ready)
-        self.recording: Recording | None = None
         self._room: dict[str, NDArray] = {}  # for the records of SETS sets, used again and again
         self._held, self._sets = 0, 1  # one set at first, so that scenes that break at once end the run at once
         self.span = span

@@ -12,10 +12,11 @@ from warp_mca.step.steps import Part
 from warp_mca.step.transfer import Transfer
 from warp_mca.system.stage import Search
 from warp_mca.system.workspace import ROWS
-from warp_mca.watch.looks import Looks
+from warp_mca.watch.looks import Looks, SceneLooks
 
 if TYPE_CHECKING:
     from warp_mca.phases.impact import Impact
+    from warp_mca.system.state import State
 
 
 class Loop:
@@ -26,8 +27,10 @@ class Loop:
         self.solver, self.state, self.steps = impact.solver, impact.state, impact.steps
         with wp.ScopedDevice(self.solver.device):
             self.solver.work.row.fill_(ROWS - 1)
-        self.transfer = Transfer(self.solver.rings(self.state), self.solver.device)
-        self.looks = self._looks()
+        rings, (transfer, looks) = self.solver.rings(self.state), impact.ways or (None, None)
+        self.transfer = transfer if transfer and transfer.carries(rings) else Transfer(rings, self.solver.device)
+        self.looks = looks if looks and looks.serve(*self._looked_at()) else self._looks()
+        impact.ways = self.transfer, self.looks
         self.written = 0
         if ended:  # each part of the ring is waited for
             self.solver.replay.note_ahead(self.state)
@@ -103,10 +106,13 @@ class Loop:
             looks, kept = self.impact.scene_runs[0].looks, self.state.scenes[0]
             kept.passed = looks.watch.renew(skins, exposed.passes, kept.passed)
             self.looks = self._looks()
+            self.impact.ways = self.transfer, self.looks
 
     def _looks(self) -> Looks:
-        looks = [item.looks for item in self.impact.scene_runs]
-        return Looks(self.solver, self.state, looks, lambda: self.impact.together, self.impact.span)
+        return Looks(self.solver, *self._looked_at(), lambda: self.impact.together)
+
+    def _looked_at(self) -> tuple[State, list[SceneLooks], float]:
+        return self.state, [item.looks for item in self.impact.scene_runs], self.impact.span
 
     def _record(self, count: int, row: int | None, searches: bool = False) -> None:
         """Record and step; `row` is the number of the row of the history that the record gives, if it gives one."""
@@ -125,7 +131,7 @@ class Loop:
             if not self.transfer.arrived:  # the device has two parts more to compute
                 self.solver.replay.note_ahead(self.state)
             self._receive()
-        self.transfer.send(self.written)
+        self.transfer.send(self.written, rows=dict.fromkeys(self.transfer.source.keys() - {"flag"}, self.written))
         self.written = 0
         self._receive_arrived()
 

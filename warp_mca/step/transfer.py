@@ -5,9 +5,11 @@ Copies go to pinned memory behind the work queued before them, so that the host 
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -50,12 +52,23 @@ class Transfer(Generic[Key]):
         """Whether one can be received without waiting."""
         return bool(self.pending) and (self.pending[0].event is None or bool(self.pending[0].event.is_complete))
 
-    def send(self, tag: int, keys: Iterable[Key] | None = None) -> None:
-        """Queue copies of the arrays `keys`, all by default, as they are once the work queued so far is done."""
+    def carries(self, arrays: Mapping[Key, wp.array]) -> bool:
+        """Whether it can bring these arrays, and nothing is under way: pinned memory takes long to allocate."""
+        alike = self.source.keys() == arrays.keys() and all(self.source[key] is arrays[key] for key in arrays)
+        return alike and not self.pending
+
+    def send(self, tag: int, keys: Iterable[Key] | None = None, rows: Mapping[Key, int] = MappingProxyType({})) -> None:
+        """Queue copies of the arrays `keys`, all by default, as they are once the work queued so far is done.
+
+        Of arrays in `rows` only their first entries are copied, so many and one at least.
+        """
         slot = self.free.pop()
         slot.tag, slot.sent = tag, tuple(self.source if keys is None else keys)
         for key in slot.sent:
-            wp.copy(slot.arrays[key], self.source[key])
+            source = self.source[key]
+            count = rows[key] * math.prod(source.shape[1:]) if key in rows else source.size
+            if count:
+                wp.copy(slot.arrays[key], source, count=count)
         if slot.event:
             wp.get_stream(slot.event.device).record_event(slot.event)
         self.pending.append(slot)

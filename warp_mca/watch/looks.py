@@ -82,16 +82,16 @@ class Looks:
         solver: Solver,
         state: State,
         scenes: Sequence[SceneLooks],
-        together: Callable[[], Together],
         span: float,
+        together: Callable[[], Together],
     ) -> None:
         """Prepare the way of what is looked at.
 
         Args:
             solver, state: of the scenes.
             scenes: what is looked at of each.
-            together: cells of all scenes that this process looks at, where there are several.
             span: of the phase [s].
+            together: cells of all scenes that this process looks at, where there are several.
         """
         self.state, self.scenes, self._together, self._steps = state, scenes, together, (solver.dt, span)
         looked_at = any(item.samples for item in scenes)
@@ -112,6 +112,12 @@ class Looks:
         springs = {str(stage.index): state.contacts[stage.index].spring.depth for stage in solver.contacts}
         sources = {"u": self._skins, "speed_square": state.speed_square} | springs
         self._watch = Transfer(sources, solver.device)
+
+    def serve(self, state: State, scenes: Sequence[SceneLooks], span: float) -> bool:
+        """Whether they can look at these scenes of a state in a phase of such a span, and nothing is under way."""
+        alike = self.state is state and self.scenes == scenes and self._steps[1] == span
+        ways = [way for way in (self._shape, self._watch) if way]
+        return alike and not (self._bending or self._skin or any(way.pending for way in ways))
 
     def row(self, interval: int, intervals: int) -> None:
         """Look at the bending of bodies, once in a while, where this output interval begins."""
