@@ -7,10 +7,11 @@ import statistics
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import warp as wp
 
-from warp_mca.system.threads import flushing
+from warp_mca.system.threads import Pool, Program
 
 
 @dataclass(frozen=True)
@@ -79,16 +80,14 @@ def captured(body: Callable[[], None], count: int, device: str) -> Callable[[], 
     """A graph of `count` times what `body` launches, as a call."""
     with wp.ScopedDevice(device):
         body()  # loads what capture must find ready
+        if not wp.get_device().is_cuda:
+            program, pool = Program(1, lambda split: body()), Pool(1)
+            return lambda: pool.run(program, count)
         with wp.ScopedCapture() as capture:
             for _ in range(count):
                 body()
-    flush = flushing(device)
-
-    def replay() -> None:
-        with flush:
-            wp.capture_launch(capture.graph)
-
-    return replay
+    graph: Any = capture.graph
+    return lambda: wp.capture_launch(graph)
 
 
 def steps_per_graph(seconds: float, care: Care) -> int:

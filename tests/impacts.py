@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import pickle
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 import warp_mca as mca
 from warp_mca.kernels.hardware.simd import RANGE_MULTIPLE
+from warp_mca.kernels.hardware.subnormals import flush, set_mode
 from warp_mca.phases.impact import Impact
 from warp_mca.phases.prepare import Clock, Prepared, Request, prepare
 from warp_mca.phases.settings import Settings
@@ -28,6 +30,29 @@ SHORT_RANGES = {
     "warp_mca.physics.elements.tet4_stage.NODES": RANGE_MULTIPLE,
     "warp_mca.physics.contact.stage.CONTACT": RANGE_MULTIPLE // 2,
 }
+
+
+@wp.kernel(enable_backward=False)
+def begin_flush(mode_out: wp.array(dtype=wp.uint32)):
+    """Take subnormal numbers for zero in this thread."""
+    mode_out[0] = flush()
+
+
+@wp.kernel(enable_backward=False)
+def end_flush(mode_out: wp.array(dtype=wp.uint32)):
+    """Take them for what they were before."""
+    mode_out[0] = set_mode(mode_out[0])
+
+
+@contextmanager
+def flushing() -> Iterator[None]:
+    """Within it what is launched on a CPU takes subnormal numbers for zero, as steps do."""
+    mode = wp.zeros(1, dtype=wp.uint32, device="cpu")
+    wp.launch(begin_flush, 1, outputs=[mode], device="cpu")
+    try:
+        yield
+    finally:
+        wp.launch(end_flush, 1, outputs=[mode], device="cpu")
 
 
 def prepared(

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import warp as wp
-from impacts import begun, figures, finished, prepared
+from impacts import begun, figures, finished, flushing, prepared
 from test_absorbing import chip_on_slab
 from test_multi_rate import METAL, STEEL, graded, hinged
 from test_overlap import Driver
@@ -23,7 +23,6 @@ from warp_mca.physics.elements.patch_stage import PatchStage
 from warp_mca.step import early_launch
 from warp_mca.step.rate_chains import Chains, Task, tasks
 from warp_mca.system.stage import Step
-from warp_mca.system.threads import flushing
 
 
 def in_some_order(found: list[Task], top: int, seed: int) -> list[Task]:
@@ -46,7 +45,7 @@ def test_tasks_in_any_order_that_keeps_their_waits_give_the_same_bits(groups: in
     for impact in (plain, chained):
         impact.advance(until=4)
     solver.step(plain.state, steps)
-    with wp.ScopedDevice("cpu"), flushing("cpu"):
+    with wp.ScopedDevice("cpu"), flushing():
         chains = Chains(chained.solver)
         found = list(tasks(chains.top, 0, steps * chains.substeps))
         order = in_some_order(found, chains.top, groups)

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 import warp as wp
-from impacts import begun, figures, finished
+from impacts import begun, figures, finished, flushing
 from test_multi_rate import hinged
 
 from warp_mca.physics.contact.stage import ContactStage
@@ -18,7 +18,7 @@ from warp_mca.step.solver import Solver
 from warp_mca.system import stage
 from warp_mca.system.stage import Stage, Step, Streams
 from warp_mca.system.state import State
-from warp_mca.system.threads import flushing
+from warp_mca.system.threads import Split, whole
 
 ENERGIES = {"element energies", "paths, frames: stress", "element sums", "spring sums"}
 Done = set[str]
@@ -110,10 +110,11 @@ def test_steps_without_a_record_wait_for_contact_before_nodes_move(monkeypatch: 
     streams.finish()
 
 
-def eager(self: Replay, state: State, name: str, body: Callable[[], None]) -> None:
-    """In place of `Replay.graph`: a CPU's graphs hold no search."""
-    with wp.ScopedDevice(self.device), flushing(self.device):
-        body()
+def eager(self: Replay, state: State, name: str, body: Callable[[Split], None], count: int = 1) -> None:
+    """In place of `Replay.program`: a CPU's graphs hold no search."""
+    with wp.ScopedDevice(self.device), flushing():
+        for _ in range(count):
+            body(whole)
 
 
 @pytest.mark.parametrize("groups", [None, 3])
@@ -122,7 +123,7 @@ def test_a_search_behind_contact_gives_the_bits_of_one_before_it(groups: int | N
     scene = hinged(duration=4e-5)
     plain = finished(scene, multi_rate=groups)
     assert plain.steps.spare and plain.state.contacts[0].count.numpy().any()
-    monkeypatch.setattr(Replay, "graph", eager)
+    monkeypatch.setattr(Replay, "program", eager)
     monkeypatch.setattr(ContactStage, "is_replayable", property(lambda own: own.bvh is not None))
     late = begun(scene, multi_rate=groups)
     late.solver.work.u_record = wp.zeros(late.solver.model.node_count, dtype=wp.vec3d, device="cpu")

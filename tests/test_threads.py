@@ -3,6 +3,8 @@
 import os
 import platform
 import threading
+from ctypes import CFUNCTYPE, c_bool, c_void_p
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -97,77 +99,94 @@ def test_a_guard_stops_a_run_with_threads():
     assert threading.active_count() <= before + 2  # none but those of a solver that is not collected yet
 
 
-@pytest.mark.parametrize("culprit", range(6))
-def test_what_a_task_raises_reaches_the_caller_and_ends_the_threads(culprit):
-    pool = threads.Pool(3)
-    done: list[int] = []
+@wp.kernel(enable_backward=False)
+def count_turn(first: int, count_out: wp.array(dtype=wp.int32)):
+    """Count the turns of an entry."""
+    i = first + wp.tid()
+    count_out[i] = count_out[i] + 1
 
-    def task(k: int) -> None:
-        if k == culprit:
-            raise ZeroDivisionError
-        done.append(k)
 
-    pool.run([lambda k=k: done.append(k) for k in range(7)])
-    assert sorted(done) == list(range(7))
-    with pytest.raises(ZeroDivisionError):
-        pool.run([lambda k=k: task(k) for k in range(6)])
-    assert not any(worker.is_alive() for worker in pool._workers)
+@wp.kernel(enable_backward=False)
+def add_up(first: int, count: wp.array(dtype=wp.int32), sum_out: wp.array(dtype=wp.float64)):
+    """Add to an entry what it finds of all after the stage before."""
+    i = first + wp.tid()
+    for k in range(count.shape[0]):
+        sum_out[i] = sum_out[i] + wp.float64(count[k])
+
+
+def program_of(number: int, size: int) -> tuple[threads.Program, wp.array, wp.array]:
+    """Two stages: entries count their turns, then each adds up those of all."""
+    count, total = wp.zeros(size, dtype=wp.int32, device="cpu"), wp.zeros(size, dtype=wp.float64, device="cpu")
+
+    def body(split: threads.Split) -> None:
+        def turn(part: slice) -> None:
+            wp.launch(count_turn, part.stop - part.start, inputs=[part.start], outputs=[count])
+
+        def add(part: slice) -> None:
+            wp.launch(add_up, part.stop - part.start, inputs=[part.start, count], outputs=[total])
+
+        split(size, turn, 64)
+        split(size, add, 64)
+
+    with wp.ScopedDevice("cpu"):
+        return threads.Program(number, body), count, total
+
+
+@pytest.mark.parametrize(("number", "stages"), [(1, [1]), (2, [8, 8]), (3, [12, 12]), (16, [16, 16])])
+def test_each_stage_follows_the_one_before_it_and_leaves_out_nothing(number, stages):
+    """Also with far more threads than cores, which hold each other up."""
+    size, repeats, pool = 1100, 50, threads.Pool(number)
+    program, count, total = program_of(number, size)
+    assert [len(stage) for stage in program.stages] == stages
+    for k in range(1, 4):
+        pool.run(program, repeats)
+        assert (count.numpy() == k * repeats).all()
+        assert (total.numpy() == size * sum(range(k * repeats + 1))).all()
+    other, others, _ = program_of(number, size)
+    pool.run(other, 2)
+    assert (others.numpy() == 2).all() and (count.numpy() == 3 * repeats).all()
+    pool.close()
+
+
+def test_a_graph_that_cannot_be_replayed_reaches_the_caller(monkeypatch):
+    program, *_ = program_of(2, 256)
+    fails = CFUNCTYPE(c_bool, c_void_p)(lambda graph: False)
+    monkeypatch.setattr(threads, "_core", lambda: SimpleNamespace(wp_apic_cpu_replay_state=fails))
+    pool = threads.Pool(2)
+    with pytest.raises(RuntimeError, match="replay"):
+        pool.run(program, 3)
 
 
 def test_threads_end_with_their_pool():
-    pool = threads.Pool(2)
-    workers = pool._workers
+    before, pool = threading.active_count(), threads.Pool(3)
+    pool.run(program_of(3, 256)[0], 1)
+    assert threading.active_count() == before + 2
     del pool
-    for worker in workers:
-        worker.join(timeout=10.0)
-        assert not worker.is_alive()
+    assert threading.active_count() == before
 
 
-def smallest() -> float:
-    """A subnormal number, made here and now."""
-    return float(np.float32(1e-38) * np.float32(0.1))
-
-
-@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="other processors are not told")
-def test_subnormal_numbers_are_zero_in_steps_and_nowhere_else():
-    assert smallest() > 0.0
-    flush, outer = threads.Flush(), threads.Flush()
-    with flush:
-        assert smallest() == 0.0
-    assert smallest() > 0.0
-    with outer:
-        with flush:
-            pass
-        assert smallest() == 0.0  # as it was before
-    with pytest.raises(KeyError), flush:
-        raise KeyError
-    assert smallest() > 0.0
-    pool, found = threads.Pool(2), {}
-    meet = threading.Barrier(2)
-
-    def task() -> None:
-        meet.wait(10.0)  # so that each thread takes one
-        found[threading.current_thread().name] = smallest()
-
-    pool.run([task, task])
-    pool.close()
-    assert sorted(value > 0.0 for value in found.values()) == [False, True]  # a worker's, and that of this thread
+@wp.kernel(enable_backward=False)
+def multiply(first: int, factor: wp.array(dtype=wp.float32), product_out: wp.array(dtype=wp.float32)):
+    """Product of each entry with the one before it."""
+    i = first + wp.tid()
+    product_out[i] = factor[i] * factor[wp.max(i - 1, 0)]
 
 
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="other processors are not told")
-@pytest.mark.parametrize("count", [1, 2])
-def test_steps_take_subnormal_numbers_for_zero(count, monkeypatch):
-    """Each replay of a step's graphs does, and leaves the thread as it was."""
-    seen = []
-    replay = wp.capture_launch
+@pytest.mark.parametrize("number", [1, 3])
+def test_subnormal_numbers_are_zero_in_programs_and_nowhere_else(number):
+    factor = wp.array(np.tile([1e-38, 0.1], 2000), dtype=wp.float32, device="cpu")
+    inside, outside = wp.zeros_like(factor), wp.zeros_like(factor)
 
-    def watched(*args: object, **more: object) -> None:
-        seen.append(smallest())
-        replay(*args, **more)
+    def body(split: threads.Split) -> None:
+        def part(some: slice) -> None:
+            wp.launch(multiply, some.stop - some.start, inputs=[some.start, factor], outputs=[inside])
 
-    monkeypatch.setattr(wp, "capture_launch", watched)
-    monkeypatch.setattr(threads, "_task", lambda graph: lambda: watched(graph))
-    mca.run(scene(), threads=count)
-    assert len(seen) > 10
-    assert set(seen) == {0.0}
-    assert smallest() > 0.0
+        split(len(factor), part, 64)
+
+    with wp.ScopedDevice("cpu"):
+        program, pool = threads.Program(number, body), threads.Pool(number)
+    pool.run(program, 100)
+    wp.launch(multiply, len(factor), inputs=[0, factor], outputs=[outside], device="cpu")
+    assert (inside.numpy()[1:] == 0.0).all()
+    assert (outside.numpy()[1:] > 0.0).all()

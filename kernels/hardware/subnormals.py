@@ -32,15 +32,3 @@ def flush() -> wp.uint32:
 def set_mode(mode: wp.uint32) -> wp.uint32:
     """Set the mode of this thread. Returns the previous mode."""
     ...
-
-
-@wp.kernel(enable_backward=False, grid_stride=False)
-def begin_flush(before_out: wp.array(dtype=wp.uint32)):
-    """Flush subnormal numbers to zero in this thread."""
-    before_out[0] = flush()
-
-
-@wp.kernel(enable_backward=False, grid_stride=False)
-def end_flush(before: wp.array(dtype=wp.uint32), flushed_out: wp.array(dtype=wp.uint32)):
-    """Restore the mode from before `begin_flush`. Returns the mode until now."""
-    flushed_out[0] = set_mode(before[0])

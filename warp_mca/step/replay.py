@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable
-from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
 import warp as wp
 
 from warp_mca.step.early_launch import launch_early, launch_together
-from warp_mca.system.threads import Pool, Split, Stages, flushing
+from warp_mca.system.threads import Pool, Program, Split
 
 if TYPE_CHECKING:
     from warp_mca.system.state import State
@@ -23,15 +22,14 @@ class Replay:
     """Graphs by state and name; those of a state go with it.
 
     Attributes:
-        pool: threads of a CPU that compute ranges of a launch side by side, or None where one thread computes.
+        pool: threads of a CPU, or None on a GPU.
     """
 
     def __init__(self, device: str, threads: int) -> None:
         self.device, self.threads = device, threads
-        self.pool = Pool(threads) if threads > 1 else None
+        self.pool = None if wp.get_device(device).is_cuda else Pool(threads)
         self._graphs: weakref.WeakKeyDictionary[State, dict[str, Any]] = weakref.WeakKeyDictionary()
         self._ahead: weakref.WeakSet[State] = weakref.WeakSet()
-        self._flushing: AbstractContextManager[object] | None = None
 
     def note_ahead(self, state: State) -> None:
         """Say that a GPU has work for longer than a graph of a whole row takes to be captured."""
@@ -60,25 +58,18 @@ class Replay:
                 launch_early(capture.graph)
                 launch_together(capture.graph)
                 graphs[name] = capture.graph
-            with self._flush():
-                wp.capture_launch(graphs[name])
+            wp.capture_launch(graphs[name])
 
-    def stages(self, state: State, name: str, body: Callable[[Split], None], count: int = 1) -> None:
-        """Replay the stages `name`, captured from `body` at their first use, `count` times with all threads of `pool`.
+    def program(self, state: State, name: str, body: Callable[[Split], None], count: int = 1) -> None:
+        """Compute the program `name`, captured from `body` at its first use, `count` times with all threads of `pool`.
 
         Raises:
-            Exception: what a thread raised.
+            RuntimeError: as in `Pool.run`.
         """
         assert self.pool is not None
-        with wp.ScopedDevice(self.device):
-            graphs = self._graphs.setdefault(state, {})
-            if name not in graphs:
-                graphs[name] = Stages(self.threads, body)
-            with self._flush():
-                for _ in range(count):
-                    graphs[name].replay(self.pool)
-
-    def _flush(self) -> AbstractContextManager[object]:
-        """Made at its first use, when `Solver.compile` has loaded what it needs."""
-        self._flushing = self._flushing or flushing(self.device)
-        return self._flushing
+        programs = self._graphs.setdefault(state, {})
+        if name not in programs:
+            with wp.ScopedDevice(self.device):
+                programs[name] = Program(self.threads, body)
+        if count:
+            self.pool.run(programs[name], count)

@@ -16,7 +16,7 @@ import warp as wp
 
 from warp_mca.base.errors import bad_value
 from warp_mca.kernels.contact.search import FLAGS
-from warp_mca.kernels.hardware import subnormals
+from warp_mca.kernels.hardware import thread_pool
 from warp_mca.physics.contact.stage import has_sides
 from warp_mca.physics.elements.stage import gather_lists
 from warp_mca.step.actors import Made, actors_of
@@ -121,7 +121,7 @@ class Solver(Made):
     def compile(self) -> None:
         """Load every kernel that a step needs, so that capture finds them ready."""
         with wp.ScopedDevice(self.device):
-            by_size: dict[int | None, list[Any]] = {None: [] if wp.get_device().is_cuda else [subnormals.begin_flush]}
+            by_size: dict[int | None, list[Any]] = {None: [] if wp.get_device().is_cuda else [thread_pool.lead]}
             by_size[None] += [kernel for actor in self.actors for kernel in actor.record_kernels()]
             kernels = [(actor.block_dim, actor.kernels()) for actor in self.actors]
             kernels += [self.resident.kernels()] if self.resident else []
@@ -218,7 +218,7 @@ class Solver(Made):
             self._step(Step(state, split, True, is_row, needs, search))
 
         if self.replay.pool:
-            self.replay.stages(state, name, record)
+            self.replay.program(state, name, record)
             state.steps += 1
             self.step(state, count - 1)
             return
@@ -239,7 +239,7 @@ class Solver(Made):
             Exception: what a thread raised.
         """
         if self.replay.pool:
-            self.replay.stages(state, "step", lambda split: self._step(Step(state, split)), count)
+            self.replay.program(state, "step", lambda split: self._step(Step(state, split)), count)
             state.steps += count
             return
 

@@ -1,36 +1,35 @@
 """Owns the threads of a CPU run: ranges of elements and nodes side by side, one stage after the other.
 
-A range is a captured graph, whose replay leaves the interpreter's lock. Which thread computes a range changes nothing
-in it, and no sum is cut, so that results do not depend on the number of threads.
+A range is a captured graph, which threads replay without the interpreter: see `kernels.hardware.thread_pool`. Which
+thread computes it changes nothing in it, and no sum is cut, so that results do not depend on the number of threads.
 """
 
 from __future__ import annotations
 
 import os
 import threading
+import time
 import weakref
-from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, nullcontext
-from functools import partial
-from itertools import pairwise
+from collections.abc import Callable, Sequence
+from ctypes import c_void_p, cast
+from itertools import accumulate, pairwise
 from numbers import Integral
-from queue import SimpleQueue
 from typing import Any
 
+import numpy as np
 import warp as wp
 
 from warp_mca.base.errors import bad_value
 from warp_mca.kernels.hardware.simd import RANGE_MULTIPLE
-from warp_mca.kernels.hardware.subnormals import begin_flush, end_flush
+from warp_mca.kernels.hardware.thread_pool import CLAIMS, FAILED, LINE, READY, STOPPED, lead, serve
 
-Task = Callable[[], object]
 Launch = Callable[[slice], None]  # of the elements or nodes of a range
 Split = Callable[[int, Launch, int], None]  # (count, launch, least length of a range)
 
-# Least length of a range, about 0.1 ms: to pass one to a thread costs about 0.02 ms.
-ELEMENTS, NODES, CONTACT = 1024, 4096, 512
+# Least length of a range, about 10 us: threads meet in about 1 us.
+ELEMENTS, NODES, CONTACT = 128, 512, 64
 MOST = 4096  # threads that can be asked for
+UNHEARD = 0.1  # time for which signals may have to wait [s]
 RANGES = 4  # for each thread: one that is held up, or meets more that yields, leaves ranges to the others
 
 
@@ -53,136 +52,106 @@ def whole(count: int, launch: Launch, least: int) -> None:
     launch(slice(0, count))
 
 
-class Flush:
-    """While it is entered, subnormal numbers are zero in the present thread of a CPU; it is not entered twice."""
-
-    def __init__(self) -> None:
-        """Load the kernels."""
-        before, until_now = (wp.zeros(1, dtype=wp.uint32, device="cpu") for _ in range(2))
-        self._begin: Any = wp.launch(begin_flush, 1, outputs=[before], device="cpu", record_cmd=True)
-        self._end: Any = wp.launch(end_flush, 1, inputs=[before], outputs=[until_now], device="cpu", record_cmd=True)
-
-    def __enter__(self) -> None:
-        self._begin.launch()
-
-    def __exit__(self, *_: object) -> None:
-        self._end.launch()
-
-
-def flushing(device: Any) -> AbstractContextManager[object]:
-    """Within it a CPU takes subnormal numbers for zero in this thread; fast math on a GPU does anyway."""
-    return nullcontext() if wp.get_device(device).is_cuda else Flush()
-
-
 class Pool:
-    """Worker threads that share the tasks of a stage with the thread that calls; a task that fails ends them."""
+    """Threads that compute programs: that of the caller, and others from the first program on.
+
+    Attributes:
+        threads: their number.
+    """
 
     def __init__(self, threads: int) -> None:
-        """Make ready for `threads` - 1 of them, which start with the first tasks."""
-        self._done: SimpleQueue[BaseException | None] = SimpleQueue()
-        self._inboxes: list[SimpleQueue[deque[Task] | None]] = [SimpleQueue() for _ in range(threads - 1)]
-        self._workers: list[threading.Thread] = []
-        self._finalizer = weakref.finalize(self, _stop, self._inboxes)
+        self.threads = threads
+        self._words: dict[int, Any] = {}
+        self._lead: Any = None
 
-    def _start(self) -> None:
-        """Start the threads and wait until they are ready: Warp may not launch anything while another captures."""
-        self._workers = [
-            threading.Thread(target=_work, args=(Flush(), inbox, self._done), name=f"warp_mca-{k}", daemon=True)
-            for k, inbox in enumerate(self._inboxes, 1)
-        ]
-        for worker in self._workers:
-            worker.start()
-        for _ in self._workers:
-            if error := self._done.get():
-                raise error
-
-    def run(self, tasks: Sequence[Task]) -> None:
-        """Carry out the tasks, in any order, and return when all are done.
+    def run(self, program: Program, repeats: int) -> None:
+        """Compute a program so many times.
 
         Raises:
-            Exception: what a task raised, once no other is under way.
+            RuntimeError: a graph cannot be replayed.
         """
-        shared = deque(tasks)
-        try:
-            if not self._workers:
-                self._start()
-            for inbox in self._inboxes[: len(tasks) - 1]:
-                inbox.put(shared)
-            left = len(tasks)
-            for task in _taken(shared):
-                task()
-                left -= 1
-            for _ in range(left):  # taken by others; who came too late to take one is not waited for
-                if error := self._done.get():
-                    raise error
-        except BaseException:  # an interrupt too: no thread may still write to arrays that are about to go
-            shared.clear()
-            self.close()
-            raise
+        leading = self._lead = self._lead or self._start()
+        self._words[program.address] = program.words  # a thread that was held up may read them when all is done
+        leading.set_param_at_index(2, program.address)
+        while repeats:
+            part, begun = min(repeats, program.at_once), time.perf_counter()
+            leading.set_param_at_index(3, part)
+            leading.launch()
+            repeats, seconds = repeats - part, (time.perf_counter() - begun) / part
+            program.at_once = max(1, int(UNHEARD / seconds))
+        if self._board[FAILED]:
+            raise RuntimeError("Warp cannot replay a graph that it captured")
+
+    def _start(self) -> Any:
+        """Start the threads and wait until they are ready: Warp may not launch anything while another captures.
+
+        Returns:
+            The launch by which the caller leads them.
+        """
+        replay = cast(_core().wp_apic_cpu_replay_state, c_void_p).value
+        board = wp.zeros(CLAIMS + LINE * self.threads, dtype=wp.int64, device="cpu")
+        self._board: Any = board.numpy()
+        leading = _command(lead, [self.threads, replay, 0, 0, board])
+        commands = [_command(serve, [k, self.threads, replay, board]) for k in range(1, self.threads)]
+        workers = [
+            threading.Thread(target=command.launch, name=f"warp_mca-{k}", daemon=True)
+            for k, command in enumerate(commands, 1)
+        ]
+        self._finalizer = weakref.finalize(self, _stop, self._board, workers)
+        for worker in workers:
+            worker.start()
+        while self._board[READY] < len(workers):
+            time.sleep(1e-4)
+        return leading
 
     def close(self) -> None:
-        """End the threads once their tasks are done."""
-        self._finalizer()
-        for worker in self._workers:
+        """End the threads."""
+        if self._lead:
+            self._finalizer()
+
+
+def _core() -> Any:
+    """Warp's library: it has no public name for what `wp.capture_launch` calls."""
+    from warp._src.context import runtime
+
+    return runtime.core
+
+
+def _command(kernel: Any, inputs: Sequence[Any]) -> Any:
+    return wp.launch(kernel, 1, inputs=inputs, device="cpu", record_cmd=True)
+
+
+def _stop(board: Any, workers: Sequence[threading.Thread]) -> None:
+    board[STOPPED] = 1
+    for worker in workers:
+        if worker.is_alive():
             worker.join()
 
 
-def _taken(tasks: deque[Task]) -> Iterator[Task]:
-    """Tasks that no other thread has taken, until none is left."""
-    while True:
-        try:
-            task = tasks.popleft()
-        except IndexError:
-            return
-        yield task
+class Program:
+    """What threads compute together: graphs of stages, each after the one before it.
 
-
-def _work(flush: Flush, inbox: SimpleQueue[deque[Task] | None], done: SimpleQueue[BaseException | None]) -> None:
-    try:
-        flush.__enter__()  # for good: the thread does nothing else
-    except BaseException as error:
-        done.put(error)
-        return
-    done.put(None)
-    while (tasks := inbox.get()) is not None:
-        try:
-            for task in _taken(tasks):
-                task()
-                done.put(None)
-        except BaseException as error:
-            tasks.clear()
-            done.put(error)
-
-
-def _stop(inboxes: Sequence[SimpleQueue[deque[Task] | None]]) -> None:
-    for inbox in inboxes:
-        inbox.put(None)
-
-
-class Stages:
-    """A step as stages of graphs: those of one stage run side by side, each stage after the one before it."""
+    Attributes:
+        stages: the graphs of each.
+        words: what `kernels.hardware.thread_pool` reads: the number of stages, the first graph of each, the number of
+            graphs, and the address of each, int64.
+        address: of these.
+        at_once: how often the program is computed before signals are heard.
+    """
 
     def __init__(self, threads: int, body: Callable[[Split], None]) -> None:
         """Capture what `body` launches on the present device; it gets the function that splits a launch."""
         self.threads = threads
-        self._stages: list[list[Task]] = []
+        self.stages: list[list[Any]] = []
         self._begin()
         try:
             body(self._split)
         finally:
             self._end()
-
-    def replay(self, pool: Pool) -> None:
-        """One step.
-
-        Raises:
-            Exception: as in `Pool.run`.
-        """
-        for stage in self._stages:
-            if len(stage) == 1:
-                stage[0]()
-            else:
-                pool.run(stage)
+        begins = accumulate(map(len, self.stages), initial=0)
+        graphs = [cast(graph.apic_state, c_void_p).value for stage in self.stages for graph in stage]
+        self.words = np.array([len(self.stages), *begins, *graphs], dtype=np.int64)
+        self.address, self.at_once = self.words.ctypes.data, 1
 
     def _begin(self) -> None:
         self._capture = wp.ScopedCapture()
@@ -191,25 +160,23 @@ class Stages:
     def _end(self) -> None:
         if self._capture.active:  # not where capturing a range failed
             self._capture.__exit__(None, None, None)
-            self._stages.append([_task(self._capture.graph)])
+            graph: Any = self._capture.graph
+            if _core().wp_apic_get_operation_count(graph.apic_state):
+                self.stages.append([graph])
 
     def _split(self, count: int, launch: Launch, least: int) -> None:
         parts = min(RANGES * self.threads, count // least)
         if parts > self.threads:
             parts -= parts % self.threads  # as many for each thread
-        if parts < 2:
+        if parts < 2 or self.threads < 2:
             launch(slice(0, count))
             return
         self._end()
-        stage: list[Task] = []
+        stage = []
         ends = [count * k // parts // RANGE_MULTIPLE * RANGE_MULTIPLE for k in range(parts)] + [count]
         for start, end in pairwise(ends):
             with wp.ScopedCapture() as capture:
                 launch(slice(start, end))
-            stage.append(_task(capture.graph))
-        self._stages.append(stage)
+            stage.append(capture.graph)
+        self.stages.append(stage)
         self._begin()
-
-
-def _task(graph: Any) -> Task:
-    return partial(wp.capture_launch, graph)
