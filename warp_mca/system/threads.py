@@ -105,9 +105,9 @@ class Pool:
         return leading
 
     def close(self) -> None:
-        """End the threads."""
+        """End the threads; a program begins them anew."""
         if self._lead:
-            self._finalizer()
+            self._lead = self._finalizer()
 
 
 def _core() -> Any:
