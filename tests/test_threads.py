@@ -5,7 +5,6 @@ import platform
 import threading
 from ctypes import CFUNCTYPE, c_bool, c_void_p
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ import warp as wp
 import warp_mca as mca
 from warp_mca.cli.main import main
 from warp_mca.step import solver
-from warp_mca.step.node_stage import order_of_nodes
 from warp_mca.system import threads
 
 pytestmark = pytest.mark.usefixtures("short_ranges")
@@ -196,18 +194,3 @@ def test_subnormal_numbers_are_zero_in_programs_and_nowhere_else(number):
     wp.launch(multiply, len(factor), inputs=[0, factor], outputs=[outside], device="cpu")
     assert (inside.numpy()[1:] == 0.0).all()
     assert (outside.numpy()[1:] > 0.0).all()
-
-
-def test_threads_move_the_nodes_of_their_own_elements():
-    """Elements go from end to end, nodes not."""
-    cells = np.arange(400)
-    nodes = np.random.default_rng(0).permutation(401).astype(np.int32)
-    block: Any = SimpleNamespace(conn=np.stack([nodes[cells], nodes[cells + 1]]))
-    for ranges in (4, 16):
-        order = order_of_nodes([block], 403, ranges)
-        assert sorted(order) == list(range(403)) and set(order[-2:]) == {401, 402}
-        first = np.argsort(nodes)[order[:-2]]  # place along the chain
-        element = np.maximum(first - 1, 0) * ranges // 400
-        assert (np.diff(element) >= 0).all()
-        for k in range(ranges):
-            assert (np.diff(order[:-2][element == k]) > 0).all()

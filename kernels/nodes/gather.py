@@ -34,7 +34,6 @@ class Kind(NamedTuple):
         each: whether gravity differs between the scenes of a batch, whose nodes then know their scene.
         rated: whether elements take steps of their own: slots come with levels, and a node may have none.
         turned: whether the forces of elements are those in floating frames.
-        ordered: whether free nodes move in another order than that of their numbers.
     """
 
     precision: str
@@ -42,7 +41,6 @@ class Kind(NamedTuple):
     each: bool = False
     rated: bool = False
     turned: bool = False
-    ordered: bool = False
 
 
 @wp.struct

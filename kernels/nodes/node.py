@@ -43,7 +43,7 @@ def integrate_kernel(
 
     If `own.rated`, first and end are entries of `item`, the node of each + (its level << LEVEL_BIT), shape
     (active_count,), int32, and kick and drift are those of level 0. Slots then come with the level of the element less
-    that of the node. If `own.ordered`, they are entries of `item` too, the nodes in another order.
+    that of the node.
     """
     vec3, Vector, Index = scalars(own.precision).vec3, kind(wp.vec3d, own.each), kind(wp.int32, own.each)
     total_force, acceleration = total_force_function(own), acceleration_function(own.each, fixed)
@@ -90,14 +90,14 @@ def integrate_kernel(
         beyond = i - end
         if wp.static(own.pushed):
             i = from_start(wp.min(i, end - 1))
-        span, push = drift, kick
+        span = drift
+        push = kick
         if wp.static(own.rated):
             i, scale = split_level(item[i])
             span *= scale
             push *= scale
-        if wp.static(own.ordered):
-            i = item[i]
-        pair, inverse = nodes.first_slots[i], nodes.inverse_mass[i]
+        pair = nodes.first_slots[i]
+        inverse = nodes.inverse_mass[i]
         wait_for_previous()
         if wp.static(own.pushed):
             if beyond >= 0:  # no node waits for the sums

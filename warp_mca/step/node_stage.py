@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
 from warp_mca.kernels.nodes import constraint, node, slide
 from warp_mca.kernels.nodes.gather import Kind, NodeData, NodeState
@@ -15,30 +14,16 @@ from warp_mca.physics.contact.per_scene import per_scene
 from warp_mca.physics.elements.stage import BLOCK_DIM
 from warp_mca.system.actor import Actor, When
 from warp_mca.system.stage import Stage, Step
-from warp_mca.system.threads import NODES, RANGES, Split, whole
+from warp_mca.system.threads import NODES, Split, whole
 from warp_mca.system.weight import nodal_gravity
 
 if TYPE_CHECKING:
     from warp_mca.step.solver import Solver
-    from warp_mca.system.block import Block
     from warp_mca.system.state import State
 
 # Patches that a block of threads computes in turn, from which on blocks take their places while nodes are advanced:
 # they do not spread evenly then, and few rounds do not level that out.
 EARLY_ROUNDS = 8
-
-
-def order_of_nodes(blocks: Iterable[Block], node_count: int, ranges: int) -> NDArray[np.int32]:
-    """Nodes by the range of elements that first has them, of so many; shape (node_count,), int32.
-
-    A thread then moves the nodes of its own elements, whose forces and displacements its cache holds.
-    """
-    share = np.ones(node_count, dtype=np.float32)  # of the elements of a block that come before the first one of a node
-    for block in blocks:
-        before = np.arange(block.conn.shape[1], dtype=np.float32) / block.conn.shape[1]
-        for nodes in block.conn:
-            np.minimum.at(share, nodes, before)
-    return np.argsort(np.floor(ranges * share), kind="stable").astype(np.int32)
 
 
 class NodeStage(Actor):
@@ -50,7 +35,6 @@ class NodeStage(Actor):
         kind: what the kernels of all nodes are compiled for; with `kind.each`, `gravity` and `scene` are arrays.
         rated: whether elements take steps of their own.
         integrate_kernel, bound_kernel: of free and of bound nodes; None where no node is bound.
-        order: in which several threads move nodes, see `order_of_nodes`, or None.
     """
 
     rated = False
@@ -70,12 +54,7 @@ class NodeStage(Actor):
             each, self.gravity = True, wp.array(own, dtype=wp.vec3d)
             self.scene = wp.array(np.arange(model.node_count), dtype=wp.int32)
         turned = work.frame is not None
-        ordered = solver.threads > 1 and not self.rated
-        self.kind = Kind(solver.precision, len(work.nodal_force) > 0, each, self.rated, turned, ordered)
-        self.order = None
-        if ordered:
-            order = order_of_nodes(model.blocks, model.node_count, RANGES * solver.threads)
-            self.order = wp.array(order, dtype=wp.int32)
+        self.kind = Kind(solver.precision, len(work.nodal_force) > 0, each, self.rated, turned)
         self._choose(bool(model.fixed_axes.any()), rounds >= EARLY_ROUNDS)
 
     def _choose(self, fixed: bool, early: bool) -> None:
@@ -151,7 +130,7 @@ class NodeStage(Actor):
         chain: int | None = None,
     ) -> None:
         """v += kick a, u += drift v of nodes whose `role` leaves them free; a step that `records` keeps the old v."""
-        inputs = [self.order, *self.given(state, None, role), self.scene, self.gravity, kick, drift]
+        inputs = [None, *self.given(state, None, role), self.scene, self.gravity, kick, drift]
         self._integrate(self.integrate_kernel, self.node_count, inputs, state, split, records, self.kind.pushed)
 
     def _integrate(

@@ -9,18 +9,18 @@ while the one before them ends.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
 
 from warp_mca.base.errors import bad_value
 from warp_mca.kernels.contact.search import FLAGS
+from warp_mca.kernels.hardware import thread_pool
 from warp_mca.physics.contact.stage import has_sides
 from warp_mca.physics.elements.stage import gather_lists
 from warp_mca.step.actors import Made, actors_of
 from warp_mca.step.device import check_device
-from warp_mca.step.loading import load_modules
 from warp_mca.step.rate_chains import Chains
 from warp_mca.step.replay import MOST, Replay
 from warp_mca.step.resident import resident
@@ -121,11 +121,15 @@ class Solver(Made):
     def compile(self) -> None:
         """Load every kernel that a step needs, so that capture finds them ready."""
         with wp.ScopedDevice(self.device):
-            sized = [(actor.block_dim, actor.kernels()) for actor in self.actors]
-            sized += [(None, actor.record_kernels()) for actor in self.actors]
-            sized += [self.resident.kernels()] if self.resident else []
-        jobs = dict.fromkeys((size, kernel.module) for size, some in sized for kernel in some)
-        load_modules(self.device, list(jobs))
+            by_size: dict[int | None, list[Any]] = {None: [] if wp.get_device().is_cuda else [thread_pool.lead]}
+            by_size[None] += [kernel for actor in self.actors for kernel in actor.record_kernels()]
+            kernels = [(actor.block_dim, actor.kernels()) for actor in self.actors]
+            kernels += [self.resident.kernels()] if self.resident else []
+            for size, some in kernels:
+                by_size[size] = by_size.get(size, []) + some
+            for size, some in by_size.items():  # a module is compiled for one number of threads
+                if modules := list(dict.fromkeys(kernel.module for kernel in some)):
+                    wp.force_load(self.device, modules, block_dim=size)  # side by side, where they must be compiled
 
     def search(self, state: State) -> None:
         """Broad phase of every contact."""
