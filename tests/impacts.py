@@ -29,6 +29,8 @@ SHORT_RANGES = {
     "warp_mca.physics.elements.tet4_stage.ELEMENTS": RANGE_MULTIPLE,
     "warp_mca.physics.elements.tet4_stage.NODES": RANGE_MULTIPLE,
     "warp_mca.physics.contact.stage.CONTACT": RANGE_MULTIPLE // 2,
+    "warp_mca.physics.contact.slave_edges.CONTACT": RANGE_MULTIPLE // 2,
+    "warp_mca.physics.contact.edge_stage.CONTACT": RANGE_MULTIPLE // 2,
 }
 
 

@@ -73,6 +73,26 @@ def test_histories_are_the_same_bit_for_bit(element, interval, viscosity):
             assert one.summary[name] == other.summary[name], name
 
 
+def test_searches_of_general_contact_are_the_same_bit_for_bit():
+    """Edges and corners of a tilted box slide over the edge of another."""
+    metal = mca.Elastic(E=70e9, nu=0.3, rho=2700.0)
+    low = mca.Box(size=(0.03, 0.01, 0.03), divisions=(9, 3, 9), origin=(-0.015, -0.01, -0.015))
+    high = mca.Box(size=(0.01, 0.01, 0.01), divisions=(7, 7, 7), origin=(-0.005, -0.005, -0.005))
+    place = {"rotation": (0.0, 0.0, 0.6), "position": (0.012, 0.005 * (np.cos(0.6) + np.sin(0.6)) + 1e-5, 0.001)}
+    bodies = (
+        mca.Body(name="low", geometry=low, material=metal),
+        mca.Body(name="high", geometry=high, material=metal, velocity=(20.0, -10.0, 3.0), **place),
+    )
+    impact = mca.ImpactPhase(duration=3e-5, output_interval=1e-6)
+    made = mca.Scene(name="edges", bodies=bodies, contacts=(mca.ContactAll(mu=0.3),), impact=impact)
+    one, *others = [mca.run(made, threads=count) for count in (1, 2, 5)]
+    assert one.summary["extremes"]["F_n_max"] > 100.0
+    for other in others:
+        assert other.summary["threads"] > 1
+        for name in one.history:
+            assert np.array_equal(one[name], other[name], equal_nan=True), name
+
+
 def test_all_cores_by_default_and_one_for_small_models(monkeypatch):
     assert threads.thread_count(None) == len(os.sched_getaffinity(0))
     monkeypatch.setattr(solver, "RANGE", 10**6)

@@ -95,6 +95,7 @@ def along_edges_kernel(each: bool, sides: int, lanes: int = 1) -> Any:
 
     @wp.kernel(enable_backward=False, module="unique")
     def list_along_edges(
+        first: int,
         bvh: wp.uint64,
         lower: wp.array(dtype=wp.vec3f),
         upper: wp.array(dtype=wp.vec3f),
@@ -112,9 +113,9 @@ def along_edges_kernel(each: bool, sides: int, lanes: int = 1) -> Any:
         face_slave_out: wp.array2d(dtype=wp.int32),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
-        lane, s = wp.tid() % wp.static(lanes), wp.tid() // wp.static(lanes)
+        lane, s = wp.tid() % wp.static(lanes), first + wp.tid() // wp.static(lanes)
         i, k = slaves.node[s], of(scene, s)
-        slid, listed, known = bool(False), int(0), Counts()  # entries of lists before the first thread adds some
+        slid, listed, f, known = bool(False), int(0), int(0), Counts()  # entries before the first thread adds some
         for p in range(wp.static(sides)):
             e = wp.static(sides) * s + p
             slid = slid or slid_off(e, spring)
@@ -127,7 +128,6 @@ def along_edges_kernel(each: bool, sides: int, lanes: int = 1) -> Any:
             for j in range(2 * slaves.offset[s], 2 * slaves.offset[s + 1]):
                 end = end_of(X, u, slaves, i, j, origin)
                 low, high = wp.min(low, end), wp.max(high, end)
-            f = int(0)
             query = wp.bvh_query_aabb(bvh, low, high, root_of(bvh, k))
             while wp.bvh_query_next(query, f):
                 if may_meet(pairs, s, f):

@@ -18,7 +18,7 @@ _NONE = 1 << 30  # larger than the number of any body
 
 @cache
 def slots_kernel(each: bool, sides: int) -> Any:
-    """Kernel: give the bodies near each slave node rows of springs of their own, as many as there are.
+    """Kernel: give the bodies near each slave node from `first` on rows of springs of their own, as many as there are.
 
     A body keeps its row while it presses the node or remembers how it did. Free rows go to the bodies nearby with the
     lowest numbers, so that the order of the search does not matter.
@@ -34,6 +34,7 @@ def slots_kernel(each: bool, sides: int) -> Any:
 
     @wp.kernel(enable_backward=False, module="unique")
     def find_slots(
+        first: int,
         bvh: wp.uint64,
         X: wp.array(dtype=wp.vec3d),
         u: wp.array(dtype=wp.vec3d),
@@ -45,7 +46,7 @@ def slots_kernel(each: bool, sides: int) -> Any:
         spring: Spring,
         slot_out: wp.array2d(dtype=wp.int32),
     ):
-        s = wp.tid()
+        s = first + wp.tid()
         each_body = wp.static(sides) // slot_out.shape[1]
         for q in range(slot_out.shape[1]):
             kept = bool(False)

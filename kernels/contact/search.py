@@ -9,6 +9,7 @@ from warp_mca.kernels.contact.edges import SlaveFaces
 from warp_mca.kernels.contact.pairs import Pairs, may_meet, spring_of
 from warp_mca.kernels.contact.projection import area_vector, distance_to_face, project_on_face
 from warp_mca.kernels.hardware.per_scene import kind, value_function
+from warp_mca.kernels.hardware.thread_pool import count_one
 
 # Entries of the flag array that the host reads with every batch of records.
 FLAGS = OVERFLOW, STALE, TOO_DEEP, TURNED = 0, 1, 2, 3
@@ -40,7 +41,7 @@ def list_slave(
     flag_out: wp.array2d(dtype=wp.int32),
 ):
     """Add a slave's list to those of face f, in any order; a full list raises the flag of scene k."""
-    place = wp.atomic_add(face_count_out, f, 1)
+    place = count_one(f, face_count_out)
     if place < face_slave_out.shape[1]:
         face_slave_out[f, place] = row
     else:
@@ -137,7 +138,9 @@ def is_listed(
 
 @cache
 def candidates_kernel(each: bool, sides: int, general: bool = False) -> Any:
-    """Kernel: list the faces near each slave node, and the slaves near each face; a full list raises the flag.
+    """Kernel: list the faces near each slave node from `first` on, and the slaves near each face.
+
+    A full list raises the flag.
 
     The caller sets the counts of the slaves to 0. With `each`, faces are grouped by scene, and a slave searches the
     faces of its scene only. If a slave has several springs, for sides of the master or for bodies of a `general`
@@ -149,6 +152,7 @@ def candidates_kernel(each: bool, sides: int, general: bool = False) -> Any:
 
     @wp.kernel(enable_backward=False, module="unique" if each or general or sides > 1 else None)
     def find_candidates(
+        first: int,
         bvh: wp.uint64,
         X: wp.array(dtype=wp.vec3d),
         u: wp.array(dtype=wp.vec3d),
@@ -165,7 +169,7 @@ def candidates_kernel(each: bool, sides: int, general: bool = False) -> Any:
         u_search_out: wp.array(dtype=wp.vec3d),
         flag_out: wp.array2d(dtype=wp.int32),
     ):
-        s = wp.tid()
+        s = first + wp.tid()
         i = slaves.node[s]
         u_search_out[i] = u[i]
         k = of(scene, s)

@@ -78,6 +78,18 @@ def wait(waited: wp.int32):
     ...
 
 
+@wp.func_native("""
+#if defined(__CUDA_ARCH__)
+    return atomicAdd(&count_out.data[f], 1);
+#else
+    return __atomic_fetch_add(&count_out.data[f], 1, __ATOMIC_RELAXED);
+#endif
+""")
+def count_one(f: wp.int32, count_out: wp.array(dtype=wp.int32)) -> wp.int32:
+    """Add 1 to entry f, which other threads of any device may do at the same time; returns what it was."""
+    ...
+
+
 @wp.func
 def claim(board_out: wp.array(dtype=wp.int64), stage: wp.int64, owner: int, count: wp.int64) -> wp.int64:
     """Which of the `count` graphs of an owner in this stage is this thread's to replay; -1 if none is left."""

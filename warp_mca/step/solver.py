@@ -133,7 +133,11 @@ class Solver(Made):
 
     def search(self, state: State) -> None:
         """Broad phase of every contact."""
-        if self.contacts.is_replayable:
+        if self.replay.pool:
+            with wp.ScopedDevice(self.device):
+                self.contacts.find_boxes(state.u)  # no graph of a CPU holds what moves the trees of boxes
+            self.replay.program(state, "search", lambda split: self.contacts.list_faces(state, state.u, split))
+        elif self.contacts.is_replayable:
             self.replay.graph(state, "search", lambda: self.contacts.search_all(state))
         else:
             with wp.ScopedDevice(self.device):

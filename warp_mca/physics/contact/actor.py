@@ -7,6 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import warp as wp
 
 from warp_mca.kernels.contact import contact
 from warp_mca.kernels.contact.spring_sums import sum_springs
@@ -17,6 +18,7 @@ from warp_mca.physics.contact.skin_edges import EdgePass
 from warp_mca.physics.contact.stage import ContactStage
 from warp_mca.system.actor import Actor, When
 from warp_mca.system.stage import BESIDE, BEYOND, LISTS, SPRINGS, Search, Stage, Step
+from warp_mca.system.threads import Split, whole
 
 if TYPE_CHECKING:
     from warp_mca.system.actor import System
@@ -74,26 +76,32 @@ class Contacts(list[ContactStage], Actor):
         """Those of a search and of a record."""
         return [kernel for stage in self for kernel in (sum_springs, *stage.search_kernels())]
 
+    def find_boxes(self, u: wp.array) -> None:
+        """First part of a search of every pass, at these displacements."""
+        for stage in self:
+            stage.find_boxes(self.solver.work, u)
+
+    def list_faces(self, state: State, u: wp.array, split: Split = whole) -> None:
+        """Second part of a search of every pass."""
+        for stage in self:
+            stage.list_faces(self.solver.work, state, u, split)
+
     def search_all(self, state: State) -> None:
         """Broad phase of every pass."""
-        for stage in self:
-            stage.search(self.solver.work, state)
+        self.find_boxes(state.u)
+        self.list_faces(state, state.u)
 
     def stages(self, when: When) -> Iterable[Stage]:
         """Forces of each pass, after the search or ahead of it, and sums of these."""
         work, dt = self.solver.work, self.solver.nodes.dt
 
-        def searching(which: Search, act: Callable[[ContactStage, Step], None]) -> Callable[[Step], None]:
-            def launch(step: Step) -> None:
-                for own in self if step.search == which else ():
-                    act(own, step)
-
-            return launch
+        def searching(which: Search, act: Callable[[State], None]) -> Callable[[Step], None]:
+            return lambda step: act(step.state) if step.search == which else None
 
         if when.common and self:
-            search = searching("before", lambda own, s: own.search(work, s.state))
-            boxes = searching("after", lambda own, s: own.find_boxes(work, work.at_record(s.state)))
-            lists = searching("after", lambda own, s: own.list_faces(work, s.state, work.at_record(s.state)))
+            search = searching("before", self.search_all)
+            boxes = searching("after", lambda state: self.find_boxes(work.at_record(state)))
+            lists = searching("after", lambda state: self.list_faces(state, work.at_record(state)))
             yield Stage("forces", "search before contact", search, BEYOND, only_records=True)
             for own in self:
                 yield Stage("forces", "contact", lambda s, own=own: own.launch(work, s.state, dt, s.split), BEYOND)

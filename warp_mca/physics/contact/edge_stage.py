@@ -123,7 +123,7 @@ class EdgeStage(ContactStage):
         wp.launch(self.bounds, self.count, inputs, [self.lower, self.upper])
         self._fit()
 
-    def list_faces(self, work: Workspace, state: State, u: wp.array) -> None:
+    def list_faces(self, work: Workspace, state: State, u: wp.array, split: Split = whole) -> None:
         """Second part of a search: the lists, which contact reads."""
         own = state.contacts[self.index]
         own.face_count.zero_()
@@ -175,7 +175,7 @@ class NoEdgeStage(EdgeStage):
     def find_boxes(self, work: Workspace, u: wp.array) -> None:
         """There is nothing to search."""
 
-    def list_faces(self, work: Workspace, state: State, u: wp.array) -> None:
+    def list_faces(self, work: Workspace, state: State, u: wp.array, split: Split = whole) -> None:
         """There is nothing to list."""
 
     def launch(self, work: Workspace, state: State, dt: float, split: Split = whole) -> None:

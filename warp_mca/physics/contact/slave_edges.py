@@ -85,13 +85,17 @@ class SlaveEdges:
         self.find = edge_shares.along_edges_kernel(stage.each, stage.sides, stage.lanes)
         self.faces = stage.slave_faces
 
-    def list_faces(self, stage: ContactStage, work: Workspace, state: State, u: wp.array) -> None:
+    def list_faces(self, stage: ContactStage, work: Workspace, state: State, u: wp.array, split: Split) -> None:
         """Add to the lists of a search the faces along edges from nodes that slid off a side."""
         own = state.contacts[stage.index]
         inputs = [stage.bvh.id, stage.lower, stage.upper, work.X, u, self.faces, stage.side]
         inputs += [stage.slave_scene, stage.origin, stage.pairs_of(own), own.spring]
-        lists = [own.count, own.candidate, own.face_count, own.face_slave]
-        wp.launch(self.find, stage.lanes * len(stage.slave), inputs, [*lists, state.flag])
+        lists = [own.count, own.candidate, own.face_count, own.face_slave, state.flag]
+
+        def launch(part: slice) -> None:
+            wp.launch(self.find, stage.lanes * (part.stop - part.start), [part.start, *inputs], lists)
+
+        split(len(stage.slave), launch, CONTACT)
 
     def launch(self, work: Workspace, own: ContactState, split: Split) -> None:
         """Add their share of the force on each edge to the inner nodes."""

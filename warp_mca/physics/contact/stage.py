@@ -195,13 +195,8 @@ class ContactStage:
             inputs += [self.slave_scene, self.origin, self.longest]
             wp.launch(self.clear, len(self.slave), inputs=inputs, outputs=[own.spring.held])
 
-    def search(self, work: Workspace, state: State) -> None:
-        """Broad phase: list what each slave may touch until the next search."""
-        self.find_boxes(work, state.u)
-        self.list_faces(work, state, state.u)
-
     def find_boxes(self, work: Workspace, u: wp.array) -> None:
-        """First part of a search: boxes around the master's faces, and the tree of these."""
+        """First part of a search, or broad phase: boxes around the master's faces, and the tree of these."""
         if self.on_plane:
             return
         inputs = [work.X, u, self.face, self.face_scene, self.origin, self.margin]
@@ -215,24 +210,28 @@ class ContactStage:
         else:
             self.bvh.refit()
 
-    def list_faces(self, work: Workspace, state: State, u: wp.array) -> None:
-        """Second part of a search: the lists, which contact reads."""
+    def list_faces(self, work: Workspace, state: State, u: wp.array, split: Split = whole) -> None:
+        """Second part of a search: what each slave may touch until the next one."""
         if self.on_plane:
             return
         own = state.contacts[self.index]
         own.face_count.zero_()
+
+        def launch(kernel: Any, inputs: Sequence[Any], outputs: Sequence[Any], part: slice) -> None:
+            wp.launch(kernel, part.stop - part.start, [part.start, *inputs], outputs)
+
         inputs = [self.bvh.id, work.X, u, self.slave_faces, self.face, self.pairs_of(own)]
+        places = [self.slave_scene, self.origin]
         if self.slots:
-            spaces = [self.slave_scene, self.origin, own.spring]
-            wp.launch(self.slots, len(self.slave), inputs=[*inputs, *spaces], outputs=[own.slot])
-        inputs += [self.side, self.slave_scene, self.origin]
+            split(len(self.slave), partial(launch, self.slots, [*inputs, *places, own.spring], [own.slot]), CONTACT)
+        inputs += [self.side, *places]
         lists = [own.count, own.candidate, own.face_count, own.face_slave, own.u_search, state.flag]
-        wp.launch(self.find, len(self.slave), inputs=inputs, outputs=lists)
+        split(len(self.slave), partial(launch, self.find, inputs, lists), CONTACT)
         if self.edges:
-            self.edges.list_faces(self, work, state, u)
+            self.edges.list_faces(self, work, state, u, split)
         list_bonds(self, own, state)
-        wp.launch(search.sort_lists, len(self.face), inputs=[own.face_count], outputs=[own.face_slave])
-        wp.launch(search.mark_masters, len(self.master), inputs=[u, self.master], outputs=[own.u_search])
+        wp.launch(search.sort_lists, len(self.face), [own.face_count], [own.face_slave])
+        wp.launch(search.mark_masters, len(self.master), [u, self.master], [own.u_search])
 
     def launch(self, work: Workspace, state: State, dt: float, split: Split = whole) -> None:
         """Contact forces of this pass, added to those on nodes; its normal forces, added to the sums of the step."""
