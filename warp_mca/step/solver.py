@@ -129,7 +129,7 @@ class Solver(Made):
                 by_size[size] = by_size.get(size, []) + some
             for size, some in by_size.items():  # a module is compiled for one number of threads
                 if modules := list(dict.fromkeys(kernel.module for kernel in some)):
-                    wp.force_load(self.device, modules, block_dim=size)  # side by side, where they must be compiled
+                    wp.force_load(self.device, modules, block_dim=size)
 
     def search(self, state: State) -> None:
         """Broad phase of every contact."""
