@@ -99,6 +99,22 @@ def test_a_guard_stops_a_run_with_threads():
     assert threading.active_count() <= before
 
 
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ZeroDivisionError])
+def test_threads_end_with_a_run_that_an_interrupt_or_a_callback_ends(error):
+    """They waited until Python looked for garbage."""
+
+    def progress(stage: str, share: float) -> None:
+        if share > 0.2:
+            assert threading.active_count() == before + 2
+            raise error
+
+    before = threading.active_count()
+    with pytest.raises(error) as held:  # as a notebook holds the last error
+        mca.run(scene(), duration=3e-4, threads=3, progress=progress)
+    assert threading.active_count() == before
+    del held
+
+
 @wp.kernel(enable_backward=False)
 def count_turn(first: int, count_out: wp.array(dtype=wp.int32)):
     """Count the turns of an entry."""
