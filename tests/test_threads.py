@@ -164,6 +164,29 @@ def test_each_stage_follows_the_one_before_it_and_leaves_out_nothing(number, sta
     pool.close()
 
 
+@pytest.mark.parametrize("number", [2, 3])
+def test_no_graph_is_taken_twice_or_left(number):
+    """Short graphs, so that threads often want the same one at the same time."""
+    size, stages, repeats, pool = 1024, 4, 50_000, threads.Pool(number)
+    count = wp.zeros(size, dtype=wp.int32, device="cpu")
+
+    def turn(part: slice) -> None:
+        wp.launch(count_turn, part.stop - part.start, inputs=[part.start], outputs=[count])
+
+    def body(split: threads.Split) -> None:
+        for _ in range(stages):
+            split(size, turn, 8)
+
+    with wp.ScopedDevice("cpu"):
+        program = threads.Program(number, body)
+    run = threading.Thread(target=pool.run, args=(program, repeats), daemon=True)
+    run.start()
+    run.join(60.0)  # a graph that is lost is waited for without end
+    assert not run.is_alive()
+    assert (count.numpy() == stages * repeats).all()
+    pool.close()
+
+
 def test_a_graph_that_cannot_be_replayed_reaches_the_caller(monkeypatch):
     program, *_ = program_of(2, 256)
     fails = CFUNCTYPE(c_bool, c_void_p)(lambda graph: False)
