@@ -119,6 +119,22 @@ def test_a_guard_stops_a_run_with_threads():
     assert threading.active_count() <= before
 
 
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ZeroDivisionError])
+def test_threads_end_with_a_run_that_an_interrupt_or_a_callback_ends(error):
+    """They waited until Python looked for garbage."""
+
+    def progress(stage: str, share: float) -> None:
+        if share > 0.2:
+            assert threading.active_count() == before + 2
+            raise error
+
+    before = threading.active_count()
+    with pytest.raises(error) as held:  # as a notebook holds the last error
+        mca.run(scene(), duration=3e-4, threads=3, progress=progress)
+    assert threading.active_count() == before
+    del held
+
+
 @wp.kernel(enable_backward=False)
 def count_turn(first: int, count_out: wp.array(dtype=wp.int32)):
     """Count the turns of an entry."""
@@ -165,6 +181,29 @@ def test_each_stage_follows_the_one_before_it_and_leaves_out_nothing(number, sta
     other, others, _ = program_of(number, size)
     pool.run(other, 2)
     assert (others.numpy() == 2).all() and (count.numpy() == 3 * repeats).all()
+    pool.close()
+
+
+@pytest.mark.parametrize("number", [2, 3])
+def test_no_graph_is_taken_twice_or_left(number):
+    """Short graphs, so that threads often want the same one at the same time."""
+    size, stages, repeats, pool = 1024, 4, 50_000, threads.Pool(number)
+    count = wp.zeros(size, dtype=wp.int32, device="cpu")
+
+    def turn(part: slice) -> None:
+        wp.launch(count_turn, part.stop - part.start, inputs=[part.start], outputs=[count])
+
+    def body(split: threads.Split) -> None:
+        for _ in range(stages):
+            split(size, turn, 8)
+
+    with wp.ScopedDevice("cpu"):
+        program = threads.Program(number, body)
+    run = threading.Thread(target=pool.run, args=(program, repeats), daemon=True)
+    run.start()
+    run.join(60.0)  # a graph that is lost is waited for without end
+    assert not run.is_alive()
+    assert (count.numpy() == stages * repeats).all()
     pool.close()
 
 

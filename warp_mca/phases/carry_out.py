@@ -82,6 +82,20 @@ class Course:
             RequestError: the folder holds the state of another request.
             GuardError: a phase before the impact lost its footing.
         """
+        try:
+            self._run(phases, told, tell, opening, ended)
+        finally:  # an interrupt and an error of a callback, too: their tracebacks hold the solver
+            if pool := self.impact.solver.replay.pool:
+                pool.close()
+
+    def _run(
+        self,
+        phases: Sequence[Any],
+        told: Told,
+        tell: Callable[[float], None],
+        opening: Callable[[], None],
+        ended: Callable[[], bool] | None,
+    ) -> None:
         found = self.store.stored(self.number) if self.store else None
         running = self._restore(*found) if found else None
         for phase in phases[len(self.stretches) :]:

@@ -220,8 +220,6 @@ class Impact:
             return  # with the last record of all
         with suppress(GuardError), few_collections():  # the error is that of the last scene
             Loop(self, told, ended).run(until)
-        if until is None and self.solver.replay.pool:
-            self.solver.replay.pool.close()
 
     def at_last_record(self) -> tuple[Array, Array]:
         """Displacements and velocities of the nodes, as `step.state_figures.at_last_record` has them."""
