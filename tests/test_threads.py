@@ -4,6 +4,7 @@ import os
 import platform
 import threading
 from ctypes import CFUNCTYPE, c_bool, c_void_p
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -94,9 +95,31 @@ def test_searches_of_general_contact_are_the_same_bit_for_bit():
 
 
 def test_all_cores_by_default_and_one_for_small_models(monkeypatch):
+    monkeypatch.setattr(threads, "GROUP", Path("/nowhere"))
     assert threads.thread_count(None) == len(os.sched_getaffinity(0))
     monkeypatch.setattr(solver, "RANGE", 10**6)
     assert mca.run(scene(), duration=2e-6, threads=2).summary["threads"] == 1
+
+
+@pytest.mark.parametrize(
+    ("files", "most"),
+    [
+        ({"cpu.max": "150000 100000\n"}, 2),
+        ({"cpu.max": "10000 100000\n"}, 1),
+        ({"cpu.max": "max 100000\n"}, 64),
+        ({"cpu/cpu.cfs_quota_us": "300000\n", "cpu/cpu.cfs_period_us": "100000\n"}, 3),
+        ({"cpu/cpu.cfs_quota_us": "-1\n", "cpu/cpu.cfs_period_us": "100000\n"}, 64),
+        ({}, 64),
+    ],
+)
+def test_a_quota_of_a_container_bounds_the_cores(files, most, tmp_path, monkeypatch):
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    monkeypatch.setattr(threads, "GROUP", tmp_path)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: range(64))
+    assert threads.thread_count(None) == most
+    assert threads.thread_count(5) == 5
 
 
 @pytest.mark.parametrize("value", [0, -1, 1.5, True, "2"])

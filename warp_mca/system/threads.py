@@ -6,14 +6,17 @@ thread computes it changes nothing in it, and no sum is cut, so that results do 
 
 from __future__ import annotations
 
+import math
 import os
 import threading
 import time
 import weakref
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from ctypes import c_void_p, cast
 from itertools import accumulate, pairwise
 from numbers import Integral
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,22 +32,37 @@ Split = Callable[[int, Launch, int], None]  # (count, launch, least length of a 
 # Least length of a range, about 10 us: threads meet in about 1 us.
 ELEMENTS, NODES, CONTACT = 128, 512, 64
 MOST = 4096  # threads that can be asked for
+GROUP = Path("/sys/fs/cgroup")  # what Linux tells of the group of a process
 UNHEARD = 0.1  # time for which signals may have to wait [s]
 RANGES = 4  # for each thread: one that is held up, or meets more that yields, leaves ranges to the others
 
 
 def thread_count(threads: int | None) -> int:
-    """The number of threads: `threads`, or all cores that this process may use if None.
+    """The number of threads: `threads`, or as many as the cores that this process may use if None.
 
     Raises:
         RequestError: it is no whole number above 0.
     """
     if threads is None:
-        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        return max(1, min(cores, _quota()))
     if isinstance(threads, bool) or not isinstance(threads, Integral) or not 1 <= threads <= MOST:
         remedy = f"give a whole number of threads from 1 to {MOST:,}, or leave it out for all cores"
         raise bad_value("threads", threads, remedy)
     return int(threads)
+
+
+def _quota() -> int:
+    """Cores whose time a container may take, where it has a quota: threads beyond it would stop all others."""
+    for quota, period in (
+        ("cpu.max", ""),  # both in one line, "max" for no quota
+        ("cpu/cpu.cfs_quota_us", "cpu/cpu.cfs_period_us"),  # -1 for no quota
+    ):
+        with suppress(OSError, ValueError):
+            words = (GROUP / quota).read_text().split() + ((GROUP / period).read_text().split() if period else [])
+            share = float(words[0]) / float(words[1])
+            return math.ceil(share) if share > 0.0 else MOST
+    return MOST
 
 
 def whole(count: int, launch: Launch, least: int) -> None:
